@@ -4,8 +4,10 @@
 
 use glam::{DQuat, DVec3, Quat};
 use tumble::reference::{ReferenceCurve, angle_between, nlerp, slerp, squad};
+use tumble::verify::{Verdict, verify};
 use tumble::{
-    Device, Ends, Engine, Interpolation, KeySigns, Method, SampleTimes, TrackSet, method,
+    Axes, Device, Ends, Engine, Interpolation, KeySigns, Layout, Method, Quantity, SampleTimes,
+    TrackSet, method,
 };
 
 fn q(wxyz: [f64; 4]) -> DQuat {
@@ -325,6 +327,53 @@ fn gltf_cubic_spline_without_tangents_eases() {
         let found = evaluate(&set, method::GLTF_CUBIC, &[at])[0];
         assert!(angle_between(found, expected) < 4e-7, "{at}");
     }
+}
+
+/// Keys that are none of glTF's cubics, from angles or of a LINEAR sampler, may have any signs. Between a key and the
+/// opposite of nearly the same rotation the cubic would pass 0, at any speed.
+#[test]
+fn gltf_cubic_spline_without_tangents_takes_the_shorter_rotation() {
+    let times: Vec<f64> = (0..9).map(f64::from).collect();
+    let even =
+        [0.0, 5.0, 10.0, 15.0, 20.0, 25.0, 20.0, 15.0, 10.0].map(|yaw| about([0.0, 1.0, 0.0], yaw));
+    let mut any_signs = even;
+    for negated in [1, 2, 5] {
+        any_signs[negated] = -any_signs[negated];
+    }
+    let at = [0.25, 0.5, 1.5, 2.5, 4.75];
+    let mut set = set_of(&times, &any_signs);
+    let expected = evaluate(&set_of(&times, &even), method::GLTF_CUBIC, &at);
+    let found = evaluate(&set, method::GLTF_CUBIC, &at);
+    for (found, expected) in found.iter().zip(&expected) {
+        assert!(angle_between(*found, *expected) < 4e-7);
+    }
+    // It eases: in the middle of an interval it is 1.5 times as fast as on the average.
+    let engine = Engine::new(Device::Cpu).unwrap();
+    let velocity = Interpolation {
+        quantity: Quantity::Velocity(Axes::Body),
+        ..method::GLTF_CUBIC.into()
+    };
+    let frames = SampleTimes::fps(60);
+    let velocities = engine
+        .rates(&set, velocity, &frames, Layout::TrackMajor)
+        .unwrap();
+    let speeds = velocities.as_slice().iter().map(|v| v.length());
+    let fastest = f64::from(speeds.fold(0.0, f32::max)).to_degrees();
+    assert!((fastest - 7.5).abs() < 0.01, "{fastest}");
+    let found = verify(&engine, &set, method::GLTF_CUBIC.into(), &frames).unwrap();
+    assert_eq!(found.verdict(), Verdict::ReferenceOnly, "{found:?}");
+
+    // As glTF specifies, keys with tangents keep their signs, and so do all if that is asked for: halfway from `p` to
+    // `-q` is `p - q`.
+    let authored = Interpolation {
+        signs: KeySigns::AsAuthored,
+        ..method::GLTF_CUBIC.into()
+    };
+    let halfway = (any_signs[0] + any_signs[1]).normalize();
+    assert!(angle_between(evaluate(&set, authored, &at)[1], halfway) < 1e-5);
+    let still = Quat::from_array([0.0; 4]);
+    set.set_tangents(0, &[[still; 2]; 9]).unwrap();
+    assert!(angle_between(evaluate(&set, method::GLTF_CUBIC, &at)[1], halfway) < 1e-5);
 }
 
 /// Roll, pitch and yaw about fixed axes.

@@ -139,8 +139,8 @@ typedef uint32_t TumbleLayout;
 #endif // __cplusplus
 
 /*
- Which sign of each key is used: `q` and `-q` are the same rotation. Methods whose definition prescribes the signs
- ignore this option.
+ Which sign of each key is used: `q` and `-q` are the same rotation. The method "gltf-cubic" ignores
+ this option in tracks with tangents, whose keys keep their signs.
  */
 enum TumblePath
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L

@@ -12,8 +12,8 @@ use tumble::{
 use crate::arguments::{option, sized, text};
 use crate::result::Failure;
 
-/// Which sign of each key is used: `q` and `-q` are the same rotation. Methods whose definition prescribes the signs
-/// ignore this option.
+/// Which sign of each key is used: `q` and `-q` are the same rotation. The method "gltf-cubic" ignores
+/// this option in tracks with tangents, whose keys keep their signs.
 #[repr(u32)]
 #[derive(Debug, Clone, Copy)]
 pub enum TumblePath {

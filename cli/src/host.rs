@@ -3,7 +3,7 @@
 use std::ffi::OsString;
 use std::path::Path;
 
-use clap::Parser;
+use clap::{ArgMatches, CommandFactory, FromArgMatches, Parser};
 use tumble::{Device, Engine, EngineOptions, Interpolation};
 use tumble_formats::Diagnostic;
 use tumble_formats::motion::Motion;
@@ -14,6 +14,7 @@ use crate::arguments::interpolation;
 use crate::commands::view;
 use crate::drivers;
 use crate::messages::exit::{self, Failure};
+use crate::messages::listing::{self, JsonForm};
 use crate::messages::{signals, words};
 
 /// Why a call failed.
@@ -42,9 +43,17 @@ impl From<Failure> for Refused {
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     words::explain_panics();
     let raw: Vec<OsString> = arguments.into_iter().collect();
-    let arguments = match Arguments::try_parse_from(&raw) {
-        Ok(arguments) => arguments,
-        Err(mut error) => {
+    let mut command = Arguments::command();
+    let parsed = command.try_get_matches_from_mut(&raw).and_then(|matches| {
+        Ok((
+            Arguments::from_arg_matches(&matches)?,
+            json_form(&matches),
+        ))
+    });
+    let (arguments, json_form) = match parsed {
+        Ok(parsed) => parsed,
+        Err(error) => {
+            let mut error = error.format(&mut command);
             words::usage(&mut error, &raw);
             return error.exit_code() as u8;
         }
@@ -52,13 +61,29 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let outcome = std::panic::catch_unwind(|| {
         arguments.global.apply();
         signals::stop_on_signals();
+        listing::begin();
         arguments.command.run()
     });
     match outcome {
         Ok(Ok(())) => exit::DONE,
-        Ok(Err(failure)) => failure.report(),
+        Ok(Err(failure)) => {
+            let printed = json_form.map_or(Ok(()), |form| listing::failed(&failure, form));
+            let code = failure.report();
+            printed.map_or_else(|failure| failure.report(), |()| code)
+        }
         Err(_) => exit::BUG, // the hook has reported it
     }
+}
+
+/// The form of the JSON that the command prints; `None` without `--json`.
+fn json_form(matches: &ArgMatches) -> Option<JsonForm> {
+    const OBJECTS: [&str; 6] = ["bench", "check", "compare", "devices", "merge", "prove"];
+    let (name, matches) = matches.subcommand()?;
+    let is_set = matches!(matches.try_get_one("json"), Ok(Some(true)));
+    is_set.then_some(match OBJECTS.contains(&name) {
+        true => JsonForm::Object,
+        false => JsonForm::List,
+    })
 }
 
 /// Sets the command of the child process that loads the Vulkan drivers, instead of this executable; see

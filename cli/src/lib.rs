@@ -129,8 +129,7 @@ mod tests {
         }
     }
 
-    /// Options that once had a name of two meanings are still known by it, and go into manifests as they
-    /// always did.
+    /// Options that once had a name of two meanings are still known by it, and go into manifests by their names now.
     #[test]
     fn older_names_of_options_are_the_same_options() {
         let route = "route hill.obj -o o.csv";
@@ -143,12 +142,12 @@ mod tests {
             (
                 "convert a -o b --up z".into(),
                 "convert a -o b --up-axis z".into(),
-                "\"up\": [\"z\"]",
+                "\"up_axis\": [\"z\"]",
             ),
             (
                 "smooth a -o b --ends loop".into(),
                 "smooth a -o b --edges loop".into(),
-                "\"ends\": [\"loop\"]",
+                "\"edges\": [\"loop\"]",
             ),
             (
                 "view a -o b --axes 9".into(),
@@ -168,7 +167,7 @@ mod tests {
             (
                 "eval a -o b --path shortest".into(),
                 "eval a -o b --signs shortest".into(),
-                "\"path\": [\"shortest\"]",
+                "\"signs\": [\"shortest\"]",
             ),
             (
                 "eval a --out b".into(),
@@ -180,7 +179,7 @@ mod tests {
                 "follow a -o b --pace 2 --path-frame fixed --path-up 0,0,1 --path-ends loop --path-speed constant \
                  --path-method linear --body-forward x"
                     .into(),
-                "\"rate\": [\"2\"]",
+                "\"pace\": [\"2\"]",
             ),
             (
                 "view a -o b --upward x --body 2".into(),
@@ -190,7 +189,7 @@ mod tests {
             (
                 "reduce a -o b --curve linear".into(),
                 "reduce a -o b --method linear".into(),
-                "\"curve\": [\"linear\"]",
+                "\"method\": [\"linear\"]",
             ),
             (
                 "prove --seconds 9".into(),

@@ -15,7 +15,7 @@ use tumble_formats::{Format, Limits};
 
 use crate::arguments::input::{FoundInput, GatheredInputs};
 use crate::batch::digest::InputFile;
-use crate::batch::entry::{InputEntry, ManifestEntry, ManifestLines, UnfinishedInputs};
+use crate::batch::entry::{FrameNotes, InputEntry, ManifestEntry, ManifestLines, UnfinishedInputs};
 use crate::batch::shards::merge as merging;
 use crate::batch::shards::plan::ShardPlan;
 use crate::batch::shards::record::{self, RefusedInput, ShardHeader};
@@ -324,7 +324,8 @@ impl Worker {
         shard.quiet = true;
         let paths = found.into_iter().map(|found| found.path);
         let jobs = shard.jobs(paths, &names, format);
-        let evaluated = self.evaluator.evaluate(&self.arguments, jobs, &mut shard)?;
+        let arguments = &self.arguments;
+        let rotations = (self.evaluator).evaluate(arguments, jobs, &mut shard, &mut Vec::new())?;
         let record = match task.record {
             true => shard.finish().map(|()| None),
             false => shard.finish_elsewhere().map(Some),
@@ -332,7 +333,7 @@ impl Worker {
         Ok(ShardOutcome {
             made: shard.made,
             skipped: shard.skipped,
-            rotations: evaluated.rotations,
+            rotations,
             device: self.evaluator.device.label.clone(),
             failed: shard.header.failed,
             record,
@@ -473,6 +474,7 @@ impl ShardRecord {
             input_sha256: Some(rows.inputs_sha256),
             options: format!("{} into={}", first.options, rows.into),
             one_of: None,
+            frames: FrameNotes::default(),
             ..first.clone()
         }];
     }
@@ -577,6 +579,7 @@ mod tests {
             tumble: env!("CARGO_PKG_VERSION").to_owned(),
             device: "CPU".to_owned(),
             one_of: one_of.map(|(all, count)| (all.to_owned(), count)),
+            frames: FrameNotes::default(),
             warnings: Vec::new(),
         })
     }

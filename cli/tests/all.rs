@@ -28,6 +28,7 @@ mod motion;
 mod peers;
 mod plot;
 mod prove;
+mod recipes;
 mod reduce;
 #[cfg(unix)]
 mod remedies;

@@ -18,6 +18,36 @@ pub(crate) fn commands() -> Vec<Command> {
     listed.cloned().collect()
 }
 
+/// Sentences of the help are broken where a line is full, and nowhere else, in terminals of any width.
+#[test]
+fn help_breaks_lines_where_they_are_full() {
+    for (command, width) in commands()
+        .iter()
+        .flat_map(|it| [80, 100, 120].map(|width| (it, width)))
+    {
+        let mut command = command.clone().term_width(width).max_term_width(width);
+        let help = command.render_long_help().to_string();
+        // Examples and tables have lines as they are.
+        let prose = help.split("\nExamples:").next().unwrap_or_default();
+        let prose = prose.split("\nExit codes:").next().unwrap_or_default();
+        let lines: Vec<&str> = prose.lines().collect();
+        for pair in lines.windows(2) {
+            let [line, next] = [pair[0], pair[1]];
+            let indent = |line: &str| line.len() - line.trim_start().len();
+            let is_item =
+                |line: &str| line.trim().is_empty() || line.trim().starts_with(['-', '[']);
+            let ends = line.trim_end().ends_with(['.', ':', ')']);
+            if is_item(line) || is_item(next) || ends || indent(line) != indent(next) {
+                continue;
+            }
+            let word = next.split_whitespace().next().unwrap_or_default();
+            let joined = line.chars().count() + 1 + word.chars().count();
+            let name = command.get_name();
+            assert!(joined > width, "{name} at {width}: `{line}` | `{next}`");
+        }
+    }
+}
+
 pub(crate) fn named(name: &str) -> Command {
     let mut all = commands().into_iter();
     all.find(|command| command.get_name() == name)

@@ -121,6 +121,33 @@ fn records_have_the_assumed_rate_and_the_end_that_is_left_out() {
         (left_out - 0.6 / 7.3).abs() < 1e-9 && chosen["frames"] == 15,
         "{chosen}"
     );
+    assert_eq!(
+        (&chosen["quantity"], &chosen["method"]),
+        (&"quaternion".into(), &"authored".into())
+    );
+    // Manifests say it too, and records of results that are kept.
+    record("eval a.dat b.dat --fps 7.3 -o out --json");
+    let path = temporary.path().join("out/manifest.jsonl");
+    let manifest = std::fs::read_to_string(&path).unwrap();
+    let line: Value = serde_json::from_str(manifest.lines().next().unwrap()).unwrap();
+    assert_eq!(
+        line["left_out_seconds"], chosen["left_out_seconds"],
+        "{line}"
+    );
+    assert!(
+        line["options"]
+            .as_str()
+            .unwrap()
+            .contains(" quantity=quaternion "),
+        "{line}"
+    );
+    let kept = record("eval a.dat b.dat --fps 7.3 -o out --json --resume");
+    assert_eq!(kept["state"], "kept", "{kept}");
+    assert_eq!(
+        kept["left_out_seconds"], chosen["left_out_seconds"],
+        "{kept}"
+    );
+    assert_eq!(std::fs::read_to_string(&path).unwrap(), manifest);
 }
 
 /// Inputs that fail are records too: a reader of the JSON alone learns of all.

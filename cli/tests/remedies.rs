@@ -78,11 +78,29 @@ const REMEDIES: &[(&str, &str, &[&str])] = &[
     ),
     (
         "eval twice.tum -o o.npy",
-        "--duplicates first or last",
+        "--duplicates first or --duplicates last keeps one of them, --duplicates both makes a jump",
         &[
             "eval twice.tum --duplicates first -o o.npy",
             "eval twice.tum --duplicates last -o o.npy",
+            "eval twice.tum --duplicates both -o o.npy",
         ],
+    ),
+    // Times that f32 cannot tell apart (E182), in a new file and in one that is kept.
+    (
+        "eval late.dat --fps 60 -o o.glb",
+        "give --fps 16 or less",
+        &["eval late.dat --fps 16 -o o.glb"],
+    ),
+    (
+        "eval late.glb --fps 60 -o o.glb",
+        "give --fps 16 or less",
+        &["eval late.glb --fps 16 -o o.glb"],
+    ),
+    // A rate that a dialect cannot hold (E918).
+    (
+        "eval take.csv --robot robot.xml --dialect mjlab --fps 29.97 -o o.npz",
+        "give --fps 30",
+        &["eval take.csv --robot robot.xml --dialect mjlab --fps 30 -o o.npz"],
     ),
     (
         "eval a.dat --quantity velocity --order wxyz -o o.npy",
@@ -136,6 +154,10 @@ fn folder() -> tempfile::TempDir {
     let waves = (0..100).map(|i| format!("{} {} 0 0 0 0 0 1\n", f64::from(i) / 50.0, i % 7));
     write("waves.tum", &waves.collect::<String>());
     write("m.gltf", &crate::attack::two_animations());
+    write("robot.xml", crate::robots::ROBOT);
+    write("take.csv", &crate::robots::take());
+    write("late.dat", "# 1 1\n1000000 1 0 0 0\n1000002 0.8 0.6 0 0\n");
+    succeed(folder, &words("eval late.dat --fps 1 -o late.glb"));
     succeed(folder, &["generate", "--hill", "-o", "hill.obj"]);
     // The paths of `route` have upward directions.
     let route = "route hill.obj --start-point 1,0,1 --end-point 8,0,8 -o ups.csv";

@@ -4,6 +4,7 @@
 use std::fs;
 
 use crate::program::{Run, run, sample_folder, succeed};
+use crate::tree::tree;
 
 fn text(run: &Run) -> &str {
     std::str::from_utf8(&run.out).unwrap()
@@ -74,10 +75,9 @@ fn a_dry_run_lists_results_and_writes_none() {
     assert_eq!(planned[1]["output"], "out/b.csv");
     assert_eq!(planned[1]["exists"], false);
     let run = run_of("eval a.dat b.dat -o out --to csv -n --resume");
-    assert!(
-        text(&run).starts_with("a.dat → out/a.csv (exists; made again if"),
-        "{}",
-        text(&run)
+    assert_eq!(
+        text(&run),
+        "a.dat → out/a.csv (complete, would be skipped)\nb.dat → out/b.csv\n"
     );
     assert_eq!(
         fs::read(folder.path().join("out/manifest.jsonl")).unwrap(),
@@ -88,6 +88,119 @@ fn a_dry_run_lists_results_and_writes_none() {
     let run = crate::program::run(folder.path(), &words("eval a.dat b.dat -o out --to csv -n"));
     assert_eq!(run.code, 3);
     assert!(run.words.contains("--overwrite"), "{}", run.words);
+}
+
+/// A dry run says of each result what the batch then does: those of clips, those that are complete, and those whose
+/// inputs are gone.
+#[test]
+fn a_dry_run_names_the_results_that_the_batch_then_makes_skips_and_removes() {
+    let folder = sample_folder();
+    let folder = folder.path();
+    let run_of = |line: &str| succeed(folder, &words(line));
+    fs::create_dir(folder.join("in")).unwrap();
+    fs::write(folder.join("in/m.gltf"), crate::attack::two_animations()).unwrap();
+    for name in ["a", "b", "c"] {
+        fs::copy(folder.join("a.dat"), folder.join(format!("in/{name}.dat"))).unwrap();
+    }
+    let planned = run_of("eval in -o out -n");
+    let planned: Vec<&str> = text(&planned).lines().collect();
+    let of_clips = [
+        "in/m.gltf Run → out/m.Run.npy",
+        "in/m.gltf Walk → out/m.Walk.npy",
+    ];
+    assert_eq!(planned[3..], of_clips, "{planned:?}");
+    assert!(!folder.join("out").exists());
+    run_of("eval in -o out");
+    fs::remove_file(folder.join("in/b.dat")).unwrap();
+    fs::copy(folder.join("b.dat"), folder.join("in/d.dat")).unwrap();
+    let changed = fs::read_to_string(folder.join("a.dat")).unwrap() + "\n";
+    fs::write(folder.join("in/c.dat"), changed).unwrap();
+    let before = tree(&folder.join("out"));
+    let dry = run_of("eval in -o out -n --resume --prune");
+    assert_eq!(
+        text(&dry).lines().collect::<Vec<_>>(),
+        [
+            "in/a.dat → out/a.npy (complete, would be skipped)",
+            "in/c.dat → out/c.npy (made again: its input, an option or the program differs, or it is damaged)",
+            "in/d.dat → out/d.npy",
+            "in/m.gltf → out/m.Run.npy (complete, would be skipped)",
+            "in/m.gltf → out/m.Walk.npy (complete, would be skipped)",
+            "removes out/b.npy (its input is gone)",
+        ]
+    );
+    let summary =
+        "2 results would be made, 3 skipped (already complete), 1 removed; nothing was written";
+    assert!(dry.words.contains(summary), "{}", dry.words);
+    assert_eq!(tree(&folder.join("out")), before);
+    let json = run_of("eval in -o out -n --resume --prune --json");
+    let json: serde_json::Value = serde_json::from_slice(&json.out).unwrap();
+    let states: Vec<&str> = json
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|it| it["state"].as_str().unwrap())
+        .collect();
+    assert_eq!(
+        states,
+        ["kept", "planned", "planned", "kept", "kept", "pruned"]
+    );
+    // The batch does what was said.
+    let done = run_of("eval in -o out --resume --prune");
+    let summary = "2 results made, 3 results of 2 inputs skipped (already complete)";
+    assert!(done.words.contains(summary), "{}", done.words);
+    assert!(!folder.join("out/b.npy").exists() && folder.join("out/d.npy").exists());
+    let one = run(folder, &words("eval in/m.gltf -o m.npy -n"));
+    assert!(
+        one.code == 4 && one.words.contains("--animation"),
+        "{}",
+        one.words
+    );
+}
+
+/// A program that reads the JSON learns of an output that cannot be written, and of a batch that the disk ends.
+#[test]
+fn a_command_that_fails_before_its_results_prints_its_failure_as_json() {
+    let folder = sample_folder();
+    for (line, code, words_of) in [
+        ("eval a.dat -o none/o.npy --json", 7, "none does not exist"),
+        ("eval a.dat b.dat -o old.npy --json", 2, "need a directory"),
+        ("check none.jsonl --json", 4, "cannot be read"),
+        ("compare bad.dat a.dat --json", 4, "E020"),
+    ] {
+        let run = run(folder.path(), &words(line));
+        assert_eq!(run.code, code, "{line}: {}", run.words);
+        let json: serde_json::Value = serde_json::from_slice(&run.out).unwrap();
+        // In the form of the command's results: a list, or one object.
+        let json = if json.is_array() { json[0].clone() } else { json };
+        assert_eq!(
+            (&json["state"], &json["code"]),
+            (&"failed".into(), &code.into())
+        );
+        assert!(
+            json["message"].as_str().unwrap().contains(words_of),
+            "{json}"
+        );
+    }
+    let silent = run(folder.path(), &words("eval a.dat -o none/o.npy"));
+    assert!(silent.out.is_empty());
+}
+
+#[test]
+fn patterns_that_leave_nothing_out_are_told() {
+    let folder = sample_folder();
+    let line = "eval folder b.dat -o out --exclude b.* --exclude *_draft.dat -n";
+    let run = succeed(folder.path(), &words(line));
+    let told: Vec<&str> = run
+        .words
+        .lines()
+        .filter(|line| line.contains("--exclude"))
+        .collect();
+    assert_eq!(
+        told,
+        [
+            "warning: --exclude '*_draft.dat' leaves nothing out: no name of a file or a folder matches it"
+        ]
+    );
 }
 
 /// As `plot` and `info`: an input that fails does not take the others away.

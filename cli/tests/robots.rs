@@ -799,3 +799,55 @@ fn files_of_other_programs_become_those_of_mjlab() {
         check(&arrays(&folder.join(out)), "peer50", Some(50), of, 49);
     }
 }
+
+/// Tables of differences have a row for each scalar; pictures have none of them, and say so.
+#[test]
+fn scalars_are_compared_one_by_one_and_told_where_they_are_not_drawn() {
+    let temporary = folder();
+    let folder = temporary.path();
+    let text = take();
+    let lines = text.lines().enumerate().map(|(frame, line)| match frame {
+        10 => {
+            let (others, last) = line.rsplit_once(',').unwrap();
+            format!("{others},{}\n", last.parse::<f64>().unwrap() + 0.1)
+        }
+        _ => format!("{line}\n"),
+    });
+    fs::write(folder.join("bent.csv"), lines.collect::<String>()).unwrap();
+    let compared = line(folder, "compare take.csv bent.csv --robot robot.xml --csv");
+    let text = String::from_utf8(compared.out).unwrap();
+    let rows: Vec<Vec<&str>> = text.lines().map(|row| row.split(',').collect()).collect();
+    let column = |name: &str| rows[0].iter().position(|it| *it == name).unwrap();
+    let scalars: Vec<&Vec<&str>> = rows[1..]
+        .iter()
+        .filter(|row| row[column("scalar_kind")] == "angle")
+        .collect();
+    let names: Vec<&str> = scalars.iter().map(|row| row[column("joint")]).collect();
+    assert_eq!(scalars.len(), 4, "{text}");
+    assert_eq!(names[0], "right_elbow", "the worst first: {text}");
+    let worst: f64 = scalars[0][column("scalar_largest")].parse().unwrap();
+    assert!((worst - 0.1f64.to_degrees()).abs() < 1e-4, "{text}");
+    assert_eq!(scalars[0][column("scalar_frame")], "10");
+    assert_eq!(scalars[1][column("scalar_largest")], "0");
+    let top = line(
+        folder,
+        "compare take.csv bent.csv --robot robot.xml --csv --top 1",
+    );
+    assert_eq!(String::from_utf8(top.out).unwrap().lines().count(), 3);
+
+    for drawing in [
+        "plot take.csv -o o.svg",
+        "view take.csv -o o.html",
+        "render take.csv -o o.png",
+    ] {
+        let drawn = line(folder, &format!("{drawing} --robot robot.xml --device cpu"));
+        let told = "take.csv: 4 scalars are not drawn";
+        assert!(drawn.words.contains(told), "{drawing}: {}", drawn.words);
+    }
+    let unnamed = line(folder, "info take.csv");
+    let both = String::from_utf8(unnamed.out).unwrap() + &unnamed.words;
+    assert!(
+        both.contains("W906") && both.contains("--robot FILE"),
+        "{both}"
+    );
+}

@@ -197,7 +197,7 @@ codes! {
     GltfFolder = "E116" elsewhere, "a .gltf in another folder than its files", "A .gltf file refers to other files relative to its folder, so the result can only be written into the folder of the input. Write a .glb, which contains everything.";
     NothingToAnimate = "E180" elsewhere, "nothing to animate", "An animation in glTF needs at least one time and one channel. Clips without tracks or samples cannot be written.";
     NotTrees = "E181" elsewhere, "joints that are not trees", "glTF requires that nodes are trees with finite transforms. The joints of the clip are not.";
-    TimesInF32 = "E182" elsewhere, "times that f32 cannot tell apart", "glTF stores times in f32, whose steps are 7.8 ms after a day, so some frames would have equal times. Use a lower rate, or times nearer to 0.";
+    TimesInF32 = "E182" elsewhere, "times that f32 cannot tell apart", "glTF stores times in f32, whose steps are 7.8 ms after a day, so some frames would have equal times. Give a lower rate (`--fps`); the message says which fits. NPZ, CSV and Parquet have times in f64.";
     TimesBelowZero = "E183" elsewhere, "times below 0", "glTF has no negative times. `tumble convert --start 0` removes them.";
     GlbTooLong = "E184" elsewhere, "too long for GLB", "A GLB has at most 4 GiB. Write fewer samples, or write the clips to several files.";
     // E2xx and W2xx: BVH.
@@ -293,7 +293,7 @@ codes! {
     PickleForm = "E914", "a form of pickle that is not read", "Its compression, its protocol or where its data lies is not supported. The message says how to save the file again.";
     PickleLimits = "E915", "a pickle beyond the limits", "Its values are nested deeper than 1000, are more than 2^24, contain themselves, or take more memory than the file's budget when each reference to them counts.";
     NotRecognised = "E917" elsewhere, "a skeleton that is not recognised", "Joints of two skeletons are paired by the parts of the body. The parts are found by the names and parents of joints, as in known kinds of skeletons; this skeleton is of another kind. Pair its joints with `--bones`.";
-    Dialect = "E918" elsewhere, "a motion that a dialect cannot store", "The layout of the other program has a number for each hinge and slide, one root, and frames of one rate. The message names the part of the motion that it cannot store.";
+    Dialect = "E918" elsewhere, "a motion that a dialect cannot store", "The layout of the other program has a number for each hinge and slide, one root, and frames of one rate. The message names the part of the motion that it cannot store. `--fps` of `tumble eval` samples a motion at another rate; NPZ, CSV and GLB (without `--dialect`) store all of it.";
     OutsideLimits = "E919" elsewhere, "a joint outside its limits", "`--limits refuse` makes this an error. `--limits clamp` keeps joints inside, `--limits report` warns and keeps their values.";
     ByteOrderMark = "W001", "a byte-order mark", "It is ignored. Save the file without a byte-order mark.";
     MixedLineEnds = "W002", "mixed line ends", "Some lines end in CR LF, others in LF.";
@@ -358,7 +358,7 @@ codes! {
     AssumedRate = "W903", "a rate that is assumed", "The file has neither times nor a rate, and all files of its kind have the same rate. `--source-fps` sets another rate.";
     JointLimits = "W904" elsewhere, "joints outside their limits", "The robot's file has limits of the joint, and the motion leaves them. No value is changed; `--limits clamp` keeps joints inside, `--limits refuse` makes this an error.";
     RobotMerged = "W905" elsewhere, "bodies that others merge", "If `fusestatic` is set, MuJoCo merges bodies without joints into their parents. Then the numbers of bodies differ; the names are the same.";
-    UnnamedJoints = "W906", "joints without names", "The file has a number for each joint and does not name them. They are numbered in the order of the file, which depends on the program that wrote it.";
+    UnnamedJoints = "W906", "joints without names", "The file has a number for each joint and does not name them. They are numbered in the order of the file, which depends on the program that wrote it. `--robot FILE`, in Python `robot=`, gives them the names of the joints in a robot's file.";
     QuaternionOrder = "W907", "a quaternion whose order is doubtful", "The first component is large and the last small, as for a robot that stands upright if w is first. The columns have no names; state the order with `--source-order`.";
     TranslationsDropped = "W910" elsewhere, "translations of joints that are lost", "On the target skeleton, only the hips have translations. Other joints of the source also move relative to their parents; the message has the largest distance.";
     InertObjects = "W911", "objects of classes that are not read", "Only the names of their classes are kept; no code is run. If the motion needs the value of such an object, this is an error (E912).";

@@ -1,8 +1,9 @@
 //! Tables whose rotations are no quaternions, and those with gaps.
 
-use glam::{Quat, Vec3};
+use glam::{DVec3, Quat, Vec3};
 use tumble::Channel;
 use tumble_formats::csv::read::read_csv;
+use tumble_formats::format::Space;
 use tumble_formats::{Code, Diagnostic, Loaded, ReadOptions};
 
 use crate::support::shared_data;
@@ -389,13 +390,155 @@ fn tables_of_others_have_their_values() {
     assert_eq!(robot.clips[0].set.scalar_count(), 29);
     let loaded = rows(&text("csv-messages/g1h.csv"), None).unwrap();
     assert_eq!(positions(&loaded)[1], Vec3::new(0.033_333, 0.066_667, 0.0));
-    for (name, words) in [
-        ("motive.csv", "delete the lines before it"),
-        ("vicon.csv", "frame_index=Frame"),
-        ("vins.csv", "--from euroc"),
+    let refused = read(&text("csv-messages/vins.csv"), None, false).unwrap_err();
+    assert_eq!(refused.code, Code::NoTimes, "{refused}");
+    assert!(refused.message.contains("--from euroc"), "{refused}");
+    // Tables of Motive and Vicon are read, with their rates and units; the drone turns by 1° a frame.
+    for (name, rate, keys, metres, up, second) in [
+        (
+            "motive.csv",
+            120,
+            31,
+            1.0,
+            DVec3::Y,
+            Vec3::new(0.033_333, 0.066_667, 0.0),
+        ),
+        (
+            "vicon.csv",
+            100,
+            30,
+            0.001,
+            DVec3::Z,
+            Vec3::new(0.067, 0.133, 0.0),
+        ),
     ] {
-        let refused = read(&text(&format!("csv-messages/{name}")), None, false).unwrap_err();
+        let loaded = read(&text(&format!("csv-messages/{name}")), None, false).unwrap();
+        assert_eq!(loaded.space, Some(Space { up, metres }), "{name}");
+        let clip = &loaded.clips[0];
+        let track = clip.set.track(0);
+        assert_eq!((clip.set.track_count(), track.name), (1, Some("drone")));
+        assert_eq!(track.keys.len(), keys, "{name}");
+        let found = clip.rate.or_else(|| clip.rate_of_keys());
+        assert_eq!(found, tumble::FrameRate::new(rate, 1).ok(), "{name}");
+        assert_eq!(positions(&loaded)[1], second, "{name}");
+        let turned = track.keys[0].angle_between(track.keys[1]).to_degrees();
+        assert!((turned - 1.0).abs() < 0.05, "{name}: {turned}");
+    }
+}
+
+/// Tables of motion capture systems, and what is said of those that cannot be read: each message has all that mends it.
+#[test]
+fn tables_of_motion_capture_are_read_or_told_the_export_that_is() {
+    let motive = |turning: &str, kind: &str| {
+        format!(
+            "Format Version,1.23,Take Name,T,Rotation Type,{turning},Length Units,Centimeters\n\n\
+             ,Type,{0},{0},{0},{0},{0},{0},{0},Marker\n,Name,a,a,a,a,a,a,a,m\n\
+             ,,Rotation,Rotation,Rotation,Rotation,Position,Position,Position,Position\n\
+             Frame,Time (Seconds),X,Y,Z,W,X,Y,Z,X\n\
+             0,0.0,0,0,0,1,1,2,3,9\n1,0.5,0,0,0.6,0.8,4,5,6,9\n",
+            kind
+        )
+    };
+    let loaded = read(&motive("Quaternion", "Rigid Body"), None, false).unwrap();
+    let clip = &loaded.clips[0];
+    assert!(clip.is_world, "{clip:?}");
+    assert_eq!(
+        positions(&loaded),
+        [Vec3::new(1.0, 2.0, 3.0), Vec3::new(4.0, 5.0, 6.0)]
+    );
+    assert_eq!(
+        clip.set.track(0).keys[1],
+        Quat::from_xyzw(0.0, 0.0, 0.6, 0.8)
+    );
+    assert_eq!(loaded.space.map(|space| space.metres), Some(0.01));
+    assert!(
+        loaded.warnings[0].message.contains("`m.Position X`"),
+        "{:?}",
+        loaded.warnings
+    );
+
+    let vicon = |columns: &str, cells: &str| {
+        format!(
+            "Objects,,,,,,,,\n50,,,,,,,,\n,,a:b,,,,,,\nFrame,Sub Frame,{columns}\n,,,,,,m,m,m\n{cells}"
+        )
+    };
+    let quaternions = "RX,RY,RZ,RW,TX,TY,TZ";
+    let cells = "3,0,0,0,0,1,1,2,3\n4,0,0,0,0.6,0.8,4,5,6\n";
+    let two_tables = format!("{cells}\n,,,,,,,,\nTrajectories\n100\n");
+    let loaded = read(&vicon(quaternions, &two_tables), None, false).unwrap();
+    let track = loaded.clips[0].set.track(0);
+    assert_eq!((track.name, track.keys.len()), (Some("a:b"), 2));
+    assert!(
+        (track.times[1] - track.times[0] - 0.02).abs() < 1e-12,
+        "{:?}",
+        track.times
+    );
+    assert!(
+        loaded.warnings[0].message.contains("another table"),
+        "{:?}",
+        loaded.warnings
+    );
+
+    for (text, code, remedy) in [
+        (
+            motive("XYZ", "Rigid Body"),
+            Code::NoRotations,
+            "with the rotation type Quaternion",
+        ),
+        (
+            motive("Quaternion", "Marker"),
+            Code::NoRotations,
+            "with rigid bodies or bones",
+        ),
+        (
+            vicon("RX,RY,RZ,TX,TY,TZ,", cells),
+            Code::NoRotations,
+            "quaternions, RX RY RZ RW",
+        ),
+        (
+            vicon("X,Y,Z,X,Y,Z,", cells),
+            Code::NoRotations,
+            "export objects or segments",
+        ),
+        (
+            "Segments\n50\n,,a\n1,2,3\n".to_owned(),
+            Code::NoTimes,
+            "no row begins with `Frame`",
+        ),
+    ] {
+        let refused = read(&text, None, false).unwrap_err();
+        assert_eq!(refused.code, code, "{refused}");
+        assert!(refused.message.contains(remedy), "{refused}");
+    }
+}
+
+/// Names below other lines: after what the message says, the table is read.
+#[test]
+fn names_below_other_lines_are_read_when_these_are_deleted() {
+    let lines = [
+        "Recording,walk",
+        "Time,hand.x,hand.y,hand.z,hand.w",
+        "s,1,1,1,1",
+        "0,0,0,0,1",
+    ];
+    let with_units = lines.map(|line| line.replace("s,1,1,1,1", "s,,,,"));
+    for (lines, units) in [(lines.map(str::to_owned), false), (with_units, true)] {
+        let lines: Vec<String> = match units {
+            true => lines.to_vec(),
+            false => lines
+                .iter()
+                .filter(|line| !line.starts_with('s'))
+                .cloned()
+                .collect(),
+        };
+        let refused = read(&lines.join("\n"), None, false).unwrap_err();
         assert_eq!(refused.code, Code::NoTimes, "{refused}");
-        assert!(refused.message.contains(words), "{refused}");
+        let asked = refused.message.contains("and the one of units after it");
+        assert_eq!(asked, units, "{refused}");
+        let map = refused.message.split('\'').nth(1).unwrap();
+        let left = lines.iter().skip(1).filter(|line| !line.starts_with("s,"));
+        let mended: Vec<&str> = left.map(String::as_str).collect();
+        let loaded = read(&mended.join("\n"), Some(map), false).unwrap();
+        assert_eq!(loaded.clips[0].set.track(0).name, Some("hand"));
     }
 }

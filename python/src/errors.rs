@@ -116,7 +116,7 @@ pub(crate) fn input_at(message: &str, code: Code, pointer: String) -> PyErr {
 /// A message of the program's with Python's keywords instead of options: `--map time=NAME` is
 /// `map="time=NAME"`.
 pub(crate) fn in_python(message: &str) -> String {
-    const WORDS: [(&str, &str); 12] = [
+    const WORDS: [(&str, &str); 13] = [
         (
             "--time-unit s, ms, us or ns",
             r#"time_unit="s", "ms", "us" or "ns""#,
@@ -126,8 +126,8 @@ pub(crate) fn in_python(message: &str) -> String {
             r#"time_unit="ms", "us" or "ns""#,
         ),
         (
-            "--duplicates first or last keeps one key, both keeps a jump",
-            r#"duplicates="first" or "last" keeps one key, "both" keeps a jump"#,
+            "--duplicates first or --duplicates last keeps one of them, --duplicates both makes a jump",
+            r#"duplicates="first" or "last" keeps one of them, "both" makes a jump"#,
         ),
         (
             "--duplicates first or last",
@@ -141,6 +141,7 @@ pub(crate) fn in_python(message: &str) -> String {
         ("`--by edges`", r#"`by="edges"`"#),
         ("--weld DISTANCE", "weld=DISTANCE"),
         ("--source-fps FPS", "source_fps=FPS"),
+        (" (with `tumble eval`)", ""),
     ];
     const FLAGS: [&str; 5] = [
         "bridge_gaps",

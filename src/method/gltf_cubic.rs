@@ -15,10 +15,12 @@ use crate::tracks::set::Track;
 /// glTF's CUBICSPLINE: a normalised cubic in each component, with the tangents of
 /// [`TrackSet::set_tangents`](crate::tracks::set::TrackSet::set_tangents).
 ///
-/// Keys always keep their signs, as glTF specifies. In a track without tangents all tangents are 0.
+/// In a track with tangents keys keep their signs, as glTF specifies. Tracks without tangents are none of glTF's: there
+/// all tangents are 0, each key is at rest, and [`Interpolation::signs`] applies as for every method. Keys from angles
+/// or of other samplers may have any signs, and between `q` and nearly `-q` the cubic would rotate at any speed.
 pub const GLTF_CUBIC: Method = Method {
     name: "gltf-cubic",
-    summary: "glTF's CUBICSPLINE, exactly as specified; tangents are given",
+    summary: "glTF's CUBICSPLINE, exactly as specified; without tangents each key is at rest",
     formula: "p(t) = (2t³-3t²+1) q0 + h (t³-2t²+t) out0 + (3t²-2t³) q1 + h (t³-t²) in1, q = p/|p|",
     source: "glTF 2.0, appendix C.5, Cubic Spline Interpolation",
     continuity: Continuity::C1,

@@ -99,6 +99,15 @@ impl Interpolation {
         [self.before, self.after].contains(&WrapMode::Mirror)
     }
 
+    /// Which sign of each key of a track is used: where the method prescribes it, tangents belong to the signs that the
+    /// keys have.
+    pub(crate) fn signs_of(&self, track: Track<'_>) -> KeySigns {
+        match self.method.signs {
+            Some(prescribed) if !track.tangents.is_empty() => prescribed,
+            _ => self.signs,
+        }
+    }
+
     /// As [`Interpolation::check`], and whether the track `index` of a set fits the ends.
     pub(crate) fn check_track(
         &self,
@@ -130,7 +139,6 @@ impl Interpolation {
         let MethodInput::Velocities { jumps, .. } = smooth.input else {
             return Vec::new();
         };
-        let path = self.method.signs.unwrap_or(self.signs);
         let of_track = |index: usize| {
             if self
                 .check_track(set.times_and_keys(index).1, index)
@@ -138,7 +146,8 @@ impl Interpolation {
             {
                 return None;
             }
-            let keys = jumps(set.track(index), path.signs(set, index), self);
+            let track = set.track(index);
+            let keys = jumps(track, self.signs_of(track).signs(set, index), self);
             Some(InterpolationWarning::AccelerationJumps {
                 track: index,
                 key: *keys.first()?,
@@ -199,13 +208,10 @@ impl ReferenceCurve {
     #[must_use]
     pub fn of(interpolation: &Interpolation, track: Track<'_>) -> Self {
         let &Interpolation {
-            method,
-            signs: path,
-            ends,
-            ..
+            method, ends, tcb, ..
         } = interpolation;
-        let path = method.signs.unwrap_or(path);
-        let curve = Self::of_track(method.reference(), path, ends, interpolation.tcb, track);
+        let signs = interpolation.signs_of(track);
+        let curve = Self::of_track(method.reference(), signs, ends, tcb, track);
         match interpolation.speed {
             Speed::AsKeyed => curve,
             Speed::Constant => curve.at_constant_speed(),

@@ -17,8 +17,8 @@ use crate::tracks::set::key_data::Tcb;
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct InterpolationOptions {
-    /// Which sign of each key is used; `None`: [`KeySigns::Shortest`]. Methods whose definition prescribes the signs
-    /// ignore this option.
+    /// Which sign of each key is used; `None`: [`KeySigns::Shortest`]. [`GLTF_CUBIC`](crate::method::GLTF_CUBIC)
+    /// ignores this option in tracks with tangents.
     pub signs: Option<KeySigns>,
     /// The curve at the first and at the last key; `None`: the default of the method.
     pub ends: Option<Ends>,
@@ -214,7 +214,7 @@ impl InterpolationOptions {
     pub fn with(&self, method: Method) -> Interpolation {
         Interpolation {
             method,
-            signs: method.signs.or(self.signs).unwrap_or_default(),
+            signs: self.signs.unwrap_or_default(),
             ends: self.ends.unwrap_or(method.ends),
             tcb: self.tcb,
             quantity: self.quantity,
@@ -282,7 +282,7 @@ mod tests {
         for method in METHODS {
             let found = InterpolationOptions::default().with(method);
             assert_eq!(found.ends, method.ends);
-            assert_eq!(found.signs, method.signs.unwrap_or_default());
+            assert_eq!(found.signs, KeySigns::Shortest);
             assert_eq!(found, Interpolation::from(method));
         }
     }

@@ -115,7 +115,7 @@ pub struct Method {
     pub form: Form,
     /// The default ends.
     pub ends: Ends,
-    /// The signs of keys, if the method's definition prescribes them.
+    /// The signs of keys in tracks with tangents, if the method's definition prescribes them.
     pub signs: Option<KeySigns>,
     /// The computing time on one thread.
     pub cost: Cost,

@@ -75,9 +75,7 @@ impl SmoothPreparation {
         intervals: Range<usize>,
     ) {
         let track = set.track(index);
-        let path = self.interpolation.method.signs;
-        let path = path.unwrap_or(self.interpolation.signs);
-        let signs = path.signs(set, index);
+        let signs = self.interpolation.signs_of(track).signs(set, index);
         let all = track.keys.len() - 1;
         let first_key = prepared.constants.len() as u32;
         let of_rotations = self.interpolation.quantity == Quantity::Rotation;

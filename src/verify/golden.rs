@@ -143,8 +143,12 @@ impl Default for Golden {
     }
 }
 
+/// The shortest path, unless the method prescribes the signs of keys, also of those without tangents.
 fn shortest(method: Method) -> Interpolation {
-    Interpolation::from(method)
+    Interpolation {
+        signs: method.signs.unwrap_or_default(),
+        ..method.into()
+    }
 }
 
 impl Golden {

@@ -1,6 +1,7 @@
 //! Inputs: which files a command works on (those named, those in directories, those that a pattern matches,
 //! and those in a list), and how they are opened and read, and their warnings passed on.
 
+use std::cell::Cell;
 use std::collections::{BTreeSet, HashMap};
 use std::io::{self, Read};
 use std::path::{Component, Path, PathBuf};
@@ -10,7 +11,9 @@ use clap::Args;
 use tumble_formats::format::{Document, FormatOption};
 use tumble_formats::motion::Motion;
 use tumble_formats::printable::printable;
-use tumble_formats::{Code, Diagnostic, FORMATS, Format, Limits, Loaded, ReadOptions, file_kind};
+use tumble_formats::{
+    Code, Diagnostic, FORMATS, Feature, Format, Limits, Loaded, ReadOptions, file_kind,
+};
 use walkdir::WalkDir;
 
 use crate::arguments::reading::ReadingArguments;
@@ -30,11 +33,11 @@ pub(crate) struct Inputs {
     /// Also the inputs in a text file, one a line (`-`: standard input)
     #[arg(long, value_name = "LIST")]
     files_from: Option<PathBuf>,
-    /// With --files-from: the inputs end in NUL characters, as `find -print0` writes them, instead of line ends
+    /// With --files-from: the inputs in the list end in NUL characters, as `find -print0` writes them, instead of line ends
     #[arg(short = '0', long, requires = "files_from")]
     null: bool,
-    /// Leave out inputs by a pattern of a name (of a file or a folder), or of several in a row, such as
-    /// '*_draft.bvh' or 'takes/old'; may be given several times
+    /// Leave out files and folders whose names match a pattern, such as '*_draft.bvh', or 'takes/old' for names
+    /// that follow each other in a path; may be given several times
     #[arg(long, value_name = "PATTERN", value_parser = PathPattern::new)]
     exclude: Vec<PathPattern>,
     /// Read named pipes too
@@ -227,6 +230,11 @@ pub(crate) trait InputReader: Send + 'static {
 
     /// The limits within which it reads.
     fn limits(&self) -> Limits;
+
+    /// Whether an input may have several clips, by its format.
+    fn may_have_several_clips(&self, _path: &Path) -> bool {
+        false
+    }
 }
 
 impl InputReader for Inputs {
@@ -236,6 +244,10 @@ impl InputReader for Inputs {
 
     fn limits(&self) -> Limits {
         self.limits()
+    }
+
+    fn may_have_several_clips(&self, path: &Path) -> bool {
+        self.format(path).supports(Feature::SeveralClips)
     }
 }
 
@@ -388,6 +400,44 @@ impl InputSelection<'_> {
     }
 }
 
+/// The patterns of `--exclude`, and which of them have left something out.
+struct Exclusions<'a> {
+    patterns: &'a [PathPattern],
+    has_matched: Vec<Cell<bool>>,
+}
+
+impl<'a> Exclusions<'a> {
+    fn new(patterns: &'a [PathPattern]) -> Self {
+        Self {
+            patterns,
+            has_matched: vec![Cell::new(false); patterns.len()],
+        }
+    }
+
+    /// Whether a file or a folder is left out.
+    fn contain(&self, path: &Path) -> bool {
+        let mut is_excluded = false;
+        for (pattern, has_matched) in self.patterns.iter().zip(&self.has_matched) {
+            if pattern.matches(path) {
+                has_matched.set(true);
+                is_excluded = true;
+            }
+        }
+        is_excluded
+    }
+
+    /// Warns of patterns that leave nothing out: they may be misspelt.
+    fn warn(&self) {
+        let unused = self.patterns.iter().zip(&self.has_matched);
+        for (pattern, _) in unused.filter(|(_, has_matched)| !has_matched.get()) {
+            words::warning(&format!(
+                "--exclude '{}' leaves nothing out: no name of a file or a folder matches it",
+                printable(pattern.text())
+            ));
+        }
+    }
+}
+
 /// A path that the command line or a list of inputs names.
 struct NamedPath<'a> {
     path: &'a Path,
@@ -486,6 +536,7 @@ impl GatheredInputs {
         let mut seen: HashMap<PathBuf, usize> = HashMap::new();
         let mut repeated: Vec<(usize, FoundInput)> = Vec::new();
         let mut excluded = 0;
+        let exclusions = Exclusions::new(selection.exclude);
         let named = paths.iter().map(|path| NamedPath {
             path,
             is_listed: false,
@@ -495,7 +546,7 @@ impl GatheredInputs {
             is_listed: true,
         });
         for NamedPath { path, is_listed } in named.chain(listed) {
-            let expansion = gathered.expand(path, selection);
+            let expansion = gathered.expand(path, selection, &exclusions);
             excluded += expansion.excluded;
             for mut found in expansion.found {
                 // The results of a list keep its tree.
@@ -518,6 +569,7 @@ impl GatheredInputs {
         }
         gathered.settle(repeated);
         gathered.unread.note();
+        exclusions.warn();
         for skipped in &gathered.skipped {
             let message = skipped.message.as_deref().unwrap_or_default();
             words::note(&format!("{}: {message}", printable(&skipped.input)));
@@ -569,7 +621,12 @@ impl GatheredInputs {
 
     /// The inputs that a path stands for. Files that are named or that match a pattern are left out by their paths as
     /// they are given, those in directories by their paths below the directory.
-    fn expand(&mut self, path: &Path, selection: &InputSelection<'_>) -> Expansion {
+    fn expand(
+        &mut self,
+        path: &Path,
+        selection: &InputSelection<'_>,
+        exclusions: &Exclusions<'_>,
+    ) -> Expansion {
         let alone = || {
             let name = path.file_name().unwrap_or(path.as_os_str());
             vec![FoundInput::named(path.to_owned(), name.into())]
@@ -581,7 +638,7 @@ impl GatheredInputs {
             };
         }
         if path.is_dir() {
-            let found = self.below(path, selection);
+            let found = self.below(path, selection, exclusions);
             let excluded = match found.is_empty() {
                 true => count_inputs(path, selection),
                 false => 0,
@@ -609,7 +666,7 @@ impl GatheredInputs {
         let count = all.len();
         let left = all
             .into_iter()
-            .filter(|found| !selection.excludes(&found.path));
+            .filter(|found| !exclusions.contain(&found.path));
         let found: Vec<FoundInput> = left.collect();
         Expansion {
             excluded: count - found.len(),
@@ -619,14 +676,19 @@ impl GatheredInputs {
 
     /// Every file of a format that can be read below a directory, by name. A directory that cannot be listed is an
     /// input too, which fails when it is opened.
-    fn below(&mut self, directory: &Path, selection: &InputSelection<'_>) -> Vec<FoundInput> {
+    fn below(
+        &mut self,
+        directory: &Path,
+        selection: &InputSelection<'_>,
+        exclusions: &Exclusions<'_>,
+    ) -> Vec<FoundInput> {
         let root: Arc<Path> = directory.into();
         let relative = |path: &Path| path.strip_prefix(directory).unwrap_or(path).to_owned();
         let walk = WalkDir::new(directory)
             .follow_links(true)
             .sort_by_file_name();
         let walk = walk.into_iter().filter_entry(|entry| {
-            entry.depth() == 0 || !selection.excludes(&relative(entry.path()))
+            entry.depth() == 0 || !exclusions.contain(&relative(entry.path()))
         });
         let mut found = Vec::new();
         for entry in walk {

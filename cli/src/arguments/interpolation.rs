@@ -26,7 +26,7 @@ pub(crate) struct InterpolationArguments {
     #[arg(long, value_name = "ENDS", value_parser = ends())]
     ends: Option<Ends>,
     /// Which way to rotate between neighbouring keys
-    #[arg(id = "path", long = "signs", alias = "path", value_name = "SIGNS", value_parser = key_signs())]
+    #[arg(id = "signs", long = "signs", alias = "path", value_name = "SIGNS", value_parser = key_signs())]
     signs: Option<KeySigns>,
     /// The speed along the curve
     #[arg(long, value_name = "SPEED", default_value_t, value_parser = speed())]
@@ -106,16 +106,29 @@ impl InterpolationArguments {
             choice.channel_methods().methods(clip)
         });
         let used: Vec<Method> = used.collect();
-        let checked = self.check(&each_once(used.iter()));
+        let used = each_once(used.iter());
+        let checked = self
+            .check(&used)
+            .and_then(|()| self.check_signs(&used, clip));
         checked.map_err(|message| Failure::usage(format!("{name}: {message}")))
+    }
+
+    /// Refuses `--signs` where no track takes it: one with tangents, by a method that prescribes their signs.
+    fn check_signs(self, methods: &[Method], clip: &Motion) -> Result<(), String> {
+        let takes = |method: &Method| method.signs.is_none() || method.signs == self.signs;
+        let has_tangents = clip.set.tracks().all(|track| !track.tangents.is_empty());
+        if self.signs.is_some() && has_tangents && !methods.iter().any(takes) {
+            return Err(format!(
+                "--signs has no effect on {} between keys with tangents, which belong to the signs of the \
+                 keys; leave it out",
+                names_of(methods)
+            ));
+        }
+        Ok(())
     }
 
     /// Refuses options that have no effect on any of these methods.
     pub(crate) fn check(self, methods: &[Method]) -> Result<(), String> {
-        let names = || {
-            let names: Vec<&str> = methods.iter().map(|method| method.name).collect();
-            names.join(", ")
-        };
         let is_none = |says: fn(&Method) -> bool| !methods.iter().any(says);
         for (option, value) in [
             ("--tension", self.tension),
@@ -133,19 +146,16 @@ impl InterpolationArguments {
             return Err(format!(
                 "--ends has no effect on {}, whose curves depend on the two keys that they join; \
                  leave it out, or choose another method (-m)",
-                names()
-            ));
-        }
-        let signs = self.signs;
-        let takes = |method: &Method| method.signs.is_none() || method.signs == signs;
-        if signs.is_some() && !methods.iter().any(takes) {
-            return Err(format!(
-                "--signs has no effect on {}, which always follows the signs of the keys; leave it out",
-                names()
+                names_of(methods)
             ));
         }
         Ok(())
     }
+}
+
+fn names_of(methods: &[Method]) -> String {
+    let names: Vec<&str> = methods.iter().map(|method| method.name).collect();
+    names.join(", ")
 }
 
 /// Parses the name of a kind of ends, of curves through rotations or through points.

@@ -1,8 +1,9 @@
 //! The options of a command line: which are explicit, the values of all, and, for the commands that write
 //! results, a row of [`OPTIONS`] each. It is all that the program knows of an option besides its value: whether
 //! it determines the bytes of results, and which inputs or results it applies to. An option that has no effect
-//! is refused, with a remedy, and never ignored.
+//! is refused, with a remedy, and never ignored. Manifests record those that determine bytes, by their names.
 
+use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
@@ -21,7 +22,7 @@ use crate::batch::digest::{self, InputFile};
 use crate::messages::exit::Failure;
 use crate::messages::names;
 
-/// A rule about an option of this name; the name is that of its field, with `_`.
+/// A rule about an option of this name, with `_`.
 pub(crate) struct OptionRule {
     pub(crate) name: &'static str,
     pub(crate) bytes: Bytes,
@@ -150,7 +151,7 @@ pub(crate) const OPTIONS: &[OptionRule] = &[
     deciding("from"),
     deciding("animation"),
     deciding("tracks"),
-    deciding("up"),
+    deciding("up_axis"),
     reading("raw_times", FormatOption::RawTimes),
     reading("duplicates", FormatOption::Duplicates),
     reading("source_fps", FormatOption::SourceRate),
@@ -201,7 +202,7 @@ pub(crate) const OPTIONS: &[OptionRule] = &[
     // Curves.
     deciding("method"),
     deciding("ends"),
-    deciding("path"),
+    deciding("signs"),
     deciding("speed"),
     deciding("before"),
     deciding("after"),
@@ -209,7 +210,7 @@ pub(crate) const OPTIONS: &[OptionRule] = &[
     deciding("continuity"),
     deciding("bias"),
     // The quantity that is written of each rotation, and its encoding.
-    deciding("output"),
+    deciding("quantity"),
     of_results("sequence", sequence),
     of_results("major", major),
     of_results("axes", axes),
@@ -258,28 +259,93 @@ pub(crate) const OPTIONS: &[OptionRule] = &[
     deciding("mirror_axis"),
     // Paths.
     deciding("seconds"),
-    deciding("rate"),
+    deciding("pace"),
     deciding("path_method"),
     deciding("path_ends"),
-    deciding("path_frames"),
+    deciding("path_frame"),
     deciding("path_up"),
     deciding("path_speed"),
     deciding("direction"),
     deciding("no_ups"),
     deciding("twist"),
-    deciding("forward"),
-    deciding("upward"),
+    deciding("body_forward"),
+    deciding("body_up"),
     // Smoothing and reduction.
     deciding("kernel"),
     deciding("low_pass"),
     deciding("passes"),
+    deciding("edges"),
     deciding("tolerance"),
     deciding("distance"),
     deciding("shell"),
-    deciding("curve"),
     deciding("quantize"),
     deciding("meshopt"),
 ];
+
+/// The names of options in manifests of before, as the text of a command begins, and the names since.
+const RENAMED: &[(&str, &str, &str)] = &[
+    ("", "output", "quantity"),
+    ("", "path", "signs"),
+    ("", "up", "up_axis"),
+    ("follow", "rate", "pace"),
+    ("follow", "path_frames", "path_frame"),
+    ("follow", "forward", "body_forward"),
+    ("follow", "upward", "body_up"),
+    ("smooth", "ends", "edges"),
+    ("reduce", "curve", "method"),
+];
+
+/// The text of options in a manifest, with the names that they have now. The options of the command line are in the
+/// order of their names; a text may have others after them.
+pub(crate) fn with_present_names(text: &str) -> Cow<'_, str> {
+    let is_option =
+        |name: &str| rule(name).is_some() || RENAMED.iter().any(|(_, before, _)| *before == name);
+    let (mut command, mut options) = (String::new(), Vec::<(String, String)>::new());
+    for word in text.split(' ') {
+        match (word.split_once('='), options.last_mut()) {
+            (Some((name, value)), _) if is_option(name) => {
+                options.push((name.to_owned(), value.to_owned()));
+            }
+            // A value with a blank.
+            (_, Some((_, value))) => *value += &format!(" {word}"),
+            (_, None) => command = word.to_owned(),
+        }
+    }
+    let ordered = options.is_sorted_by(|(a, _), (b, _)| a < b);
+    let in_order = match ordered {
+        true => options.len(),
+        false => {
+            1 + options
+                .windows(2)
+                .position(|pair| pair[0].0 >= pair[1].0)
+                .unwrap_or(0)
+        }
+    };
+    let mut has_changed = false;
+    for (name, _) in &mut options[..in_order] {
+        let of_command = |of: &str| of.is_empty() || of == command;
+        let renamed = (RENAMED.iter()).find(|(of, before, _)| before == name && of_command(of));
+        if let Some((_, _, since)) = renamed {
+            *name = (*since).to_owned();
+            has_changed = true;
+        }
+    }
+    if !has_changed {
+        return Cow::Borrowed(text);
+    }
+    options[..in_order].sort_by(|(a, _), (b, _)| a.cmp(b));
+    let options = options
+        .iter()
+        .map(|(name, value)| format!("{name}={value}"));
+    let command = Some(command).filter(|command| !command.is_empty());
+    Cow::Owned(
+        command
+            .into_iter()
+            .chain(options)
+            .collect::<Vec<_>>()
+            .join(" "),
+    )
+}
 
 /// The rule of an option.
 pub(crate) fn rule(name: &str) -> Option<&'static OptionRule> {
@@ -600,5 +666,47 @@ mod tests {
         let ruled: BTreeSet<&str> = OPTIONS.iter().map(|rule| rule.name).collect();
         assert_eq!(named, ruled);
         assert_eq!(ruled.len(), OPTIONS.len(), "a rule each");
+        // The names in manifests are those of the command line.
+        for argument in commands.iter().flat_map(|command| command.get_arguments()) {
+            let name = argument.get_id().as_str();
+            let decides = rule(name).is_some_and(|rule| rule.bytes != Bytes::Unchanged);
+            let long = argument.get_long().unwrap_or_default();
+            assert!(
+                !decides || long.replace('-', "_") == name,
+                "{name} is --{long}"
+            );
+        }
+    }
+
+    #[test]
+    fn options_in_manifests_of_before_have_their_present_names() {
+        for (before, since) in [
+            (
+                "layout=track method=slerp output=euler path=shortest sequence=XYZ times=0f",
+                "layout=track method=slerp quantity=euler sequence=XYZ signs=shortest times=0f",
+            ),
+            (
+                "encoding=f32 order=wxyz up=z times=0f",
+                "encoding=f32 order=wxyz up_axis=z times=0f",
+            ),
+            (
+                "map=a = b,output=x method=slerp",
+                "map=a = b,output=x method=slerp",
+            ),
+            (
+                "reduce curve=linear tolerance=1",
+                "reduce method=linear tolerance=1",
+            ),
+            ("smooth ends=loop passes=2", "smooth edges=loop passes=2"),
+            (
+                "follow path_frames=fixed rate=2 upward=x",
+                "follow body_up=x pace=2 path_frame=fixed",
+            ),
+            ("ends=natural method=c2", "ends=natural method=c2"),
+            ("", ""),
+        ] {
+            assert_eq!(with_present_names(before), since);
+            assert_eq!(with_present_names(since), since);
+        }
     }
 }

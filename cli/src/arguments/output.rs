@@ -13,6 +13,7 @@ use tumble_formats::quaternion::ComponentOrder;
 pub(crate) struct OutputArguments {
     /// What to write of each rotation
     #[arg(
+        id = "quantity",
         long = "quantity",
         value_name = "WHAT",
         default_value = "quaternion",

@@ -25,10 +25,10 @@ pub(crate) const PATHS: &str = "Paths";
 #[derive(Debug, Clone, Args)]
 pub(crate) struct PathArguments {
     /// The duration, seconds: of paths without times
-    #[arg(long, value_name = "S", conflicts_with = "rate", value_parser = positive)]
+    #[arg(long, value_name = "S", conflicts_with = "pace", value_parser = positive)]
     seconds: Option<f64>,
     /// The distance that a body covers in a second on paths without times
-    #[arg(id = "rate", long = "pace", alias = "rate", value_name = "UNITS", value_parser = positive)]
+    #[arg(long = "pace", alias = "rate", value_name = "UNITS", value_parser = positive)]
     pace: Option<f64>,
     /// How to interpolate: the curve through the points of a path
     #[arg(long, value_name = "METHOD", default_value = "bessel-overhauser", value_parser = methods())]
@@ -41,6 +41,7 @@ pub(crate) struct PathArguments {
     direction: DirectionArgument,
     /// The orientation about this direction; several are drawn side by side
     #[arg(
+        id = "path_frame",
         long = "path-frame",
         alias = "frame",
         value_name = "FRAMES",
@@ -63,10 +64,10 @@ pub(crate) struct PathArguments {
     #[arg(long, value_name = "SPEED", default_value = "keys", hide_default_value = true, value_parser = speed)]
     path_speed: PathSpeed,
     /// The axis of the body that faces forward
-    #[arg(id = "forward", long = "body-forward", alias = "forward", value_name = "AXIS", default_value = "z", value_parser = axis, allow_hyphen_values = true)]
+    #[arg(long = "body-forward", alias = "forward", value_name = "AXIS", default_value = "z", value_parser = axis, allow_hyphen_values = true)]
     body_forward: BodyAxis,
     /// The axis of the body that faces up
-    #[arg(id = "upward", long = "body-up", alias = "upward", value_name = "AXIS", default_value = "y", value_parser = axis, allow_hyphen_values = true)]
+    #[arg(long = "body-up", alias = "upward", value_name = "AXIS", default_value = "y", value_parser = axis, allow_hyphen_values = true)]
     body_up: BodyAxis,
 }
 

@@ -93,7 +93,7 @@ pub(crate) struct ReadingArguments {
     scale: Option<ScaleArgument>,
     /// Convert to this up axis by rotating the roots: from the up axis that an FBX file states, else by
     /// 90° about x
-    #[arg(id = "up", long = "up-axis", alias = "up", value_name = "AXIS", value_parser = up_axis())]
+    #[arg(id = "up_axis", long = "up-axis", alias = "up", value_name = "AXIS", value_parser = up_axis())]
     up_axis: Option<UpAxis>,
 }
 

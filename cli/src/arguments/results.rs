@@ -16,6 +16,7 @@ use crate::arguments::options::ResultOptions;
 use crate::batch::entry::InputEntry;
 use crate::batch::output_plan::{self, OutputOptions, OutputPlan};
 use crate::batch::pipeline::{BatchOptions, ClipWork, Pipeline, PipelineInputs};
+use crate::batch::preview::{PlannedWork, Preview, preview};
 use crate::batch::result_names::ResultNaming;
 use crate::batch::target::{self, Destination, ResultTarget, WrittenFile};
 use crate::messages::exit::{ALL_INPUTS, DONE, Failure, Outcomes};
@@ -34,8 +35,8 @@ pub(crate) struct ResultArguments {
     /// the same options
     #[arg(long)]
     resume: bool,
-    /// List the results that would be written, and write none
-    #[arg(short = 'n', long, conflicts_with = "prune")]
+    /// List the results that would be written, skipped (--resume) and removed (--prune), and change nothing
+    #[arg(short = 'n', long)]
     dry_run: bool,
     /// In a directory of results: remove those whose inputs are gone, and their lines in the manifest
     #[arg(long)]
@@ -175,8 +176,12 @@ impl ResultArguments {
     }
 
     /// The destination of each input's result. Everything that can be refused is refused here, before any work.
-    pub(crate) fn plan(&self, inputs: GatheredInputs) -> Result<OutputPlan, Failure> {
-        self.plan_in(inputs, self.format)
+    pub(crate) fn plan(
+        &self,
+        inputs: GatheredInputs,
+        work: &PlannedWork<'_>,
+    ) -> Result<OutputPlan, Failure> {
+        self.plan_in(inputs, self.format, work)
     }
 
     /// As [`ResultArguments::plan`], in a format that another option may say.
@@ -184,6 +189,7 @@ impl ResultArguments {
         &self,
         inputs: GatheredInputs,
         format: Option<&'static Format>,
+        work: &PlannedWork<'_>,
     ) -> Result<OutputPlan, Failure> {
         let inputs = &self.based(inputs)?;
         let options = OutputOptions {
@@ -195,7 +201,7 @@ impl ResultArguments {
             naming: self.names,
         };
         if self.dry_run {
-            return Err(self.list_plan(inputs, options)?);
+            return Err(self.list_plan(inputs, options, work)?);
         }
         let mut plan = output_plan::plan(inputs, options)?;
         if plan.manifest.is_none() {
@@ -235,23 +241,23 @@ impl ResultArguments {
         &self,
         inputs: &GatheredInputs,
         options: OutputOptions<'_>,
+        work: &PlannedWork<'_>,
     ) -> Result<Failure, Failure> {
-        let (planned, refused) = output_plan::preview(inputs, options)?;
-        let mut outcomes = Outcomes::of(planned.len() + refused.len());
+        let preview = preview(inputs, options, work)?;
+        let summary = preview.summary();
+        let Preview { results, refused } = preview;
+        let mut outcomes = Outcomes::of(inputs.files.len());
         let failed = refused.iter();
         let failed = failed.map(|input| InputEntry::failed(&input.path, None, &input.failure));
         let failed: Vec<InputEntry> = failed.collect();
         match self.json {
-            true => listing::records(&planned, &failed)?,
+            true => listing::records(&results, &failed)?,
             false => {
-                let lines = planned.iter().map(|result| format!("{result}\n"));
+                let lines = results.iter().map(|result| format!("{result}\n"));
                 listing::text(&lines.collect::<String>())?;
             }
         }
-        words::note(&format!(
-            "{} would be made; nothing was written (--dry-run)",
-            words::count(planned.len(), "result")
-        ));
+        words::note(&summary);
         refused
             .into_iter()
             .for_each(|input| outcomes.add(Err(input.failure)));

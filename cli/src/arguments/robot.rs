@@ -66,7 +66,7 @@ fn siblings() -> impl TypedValueParser<Value = Siblings> {
     let help = |siblings| match siblings {
         Siblings::File => "as in the file of the robot",
         Siblings::BodyName => "by their names",
-        Siblings::JointName => "by the names of their joints, as pinocchio",
+        Siblings::JointName => "by the names of their joints, as pinocchio has them",
     };
     one_of(Siblings::ALL.map(|siblings| (siblings.name(), help(siblings), siblings)))
 }
@@ -96,7 +96,7 @@ fn velocities() -> impl TypedValueParser<Value = VelocitySource> {
 fn limits() -> impl TypedValueParser<Value = LimitRule> {
     let help = |rule| match rule {
         LimitRule::Report => "a warning; values are kept",
-        LimitRule::Clamp => "they become the limit, and do not move there",
+        LimitRule::Clamp => "they stay at the limit, with velocity 0",
         LimitRule::Refuse => "an error",
     };
     one_of(LimitRule::ALL.map(|rule| (rule.name(), help(rule), rule)))
@@ -300,7 +300,7 @@ impl DialectArguments {
         let (name, tree) = (&*work.name, &robot.tree);
         let Some(rate) = rate else {
             let message = format!(
-                "{} stores frames of one rate, and the samples have no rate; give --fps (`tumble eval`)",
+                "{} stores frames of one rate, and the keys have none; give --fps FPS (with `tumble eval`)",
                 dialect.name
             );
             return Err(Failure::input(

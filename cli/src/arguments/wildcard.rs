@@ -131,6 +131,8 @@ impl PatternPart {
 /// A pattern of names in a path: of one name, or of several that follow each other.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct PathPattern {
+    /// As it was given.
+    text: String,
     names: Vec<PathPart>,
 }
 
@@ -155,8 +157,16 @@ impl PathPattern {
         let names: Vec<PathPart> = names.collect::<Result<_, String>>()?;
         match names.is_empty() {
             true => Err("expected a pattern of a name, such as '*_draft.bvh'".to_owned()),
-            false => Ok(Self { names }),
+            false => Ok(Self {
+                text: text.to_owned(),
+                names,
+            }),
         }
+    }
+
+    /// Its text, as it was given.
+    pub(crate) fn text(&self) -> &str {
+        &self.text
     }
 
     /// Whether it matches names of the path that follow each other, anywhere in it: a file, or a folder that it is in.

@@ -1,5 +1,6 @@
 //! The lines of a manifest: those of earlier batches, and the recorder of new ones.
 
+use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read};
@@ -10,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use tumble_formats::Diagnostic;
 use tumble_formats::beneath::{is_beneath, open_beneath};
 
-use crate::arguments::options::OptionFile;
+use crate::arguments::options::{OptionFile, with_present_names};
 use crate::batch::digest;
 use crate::batch::target::WrittenFile;
 use crate::messages::exit::{Failure, OUTPUT};
@@ -20,7 +21,7 @@ use crate::messages::words;
 pub(crate) const NAME: &str = "manifest.jsonl";
 
 /// One result.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct ManifestEntry {
     /// Below the manifest's directory.
     pub(crate) output: String,
@@ -30,7 +31,7 @@ pub(crate) struct ManifestEntry {
     pub(crate) input: String,
     /// `None` for standard input.
     pub(crate) input_sha256: Option<String>,
-    /// Everything that determines the result besides the input.
+    /// Everything that determines the result besides the input, by the names that options have now.
     pub(crate) options: String,
     /// The files that these name.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -44,9 +45,32 @@ pub(crate) struct ManifestEntry {
     /// how many clips there are.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) one_of: Option<(String, usize)>,
+    #[serde(flatten)]
+    pub(crate) frames: FrameNotes,
     /// The warnings about the input and about writing the result.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub(crate) warnings: Vec<RecordedWarning>,
+}
+
+/// What a result's frames assume or leave out, in a manifest and in JSON.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub(crate) struct FrameNotes {
+    /// The frames a second, where they were assumed, because the keys have no rate.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) assumed_fps: Option<String>,
+    /// The seconds from the last frame to the end of the clip, where nothing follows the last frame.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) left_out_seconds: Option<f64>,
+}
+
+impl FrameNotes {
+    /// The seconds in whole nanoseconds: so few digits are the same after reading and writing.
+    pub(crate) fn new(assumed_fps: Option<String>, left_out_seconds: Option<f64>) -> Self {
+        Self {
+            assumed_fps,
+            left_out_seconds: left_out_seconds.map(|seconds| (seconds * 1e9).round() / 1e9),
+        }
+    }
 }
 
 /// A warning in a manifest and in JSON.
@@ -177,7 +201,10 @@ pub(crate) type InputEntries = BTreeMap<String, InputEntry>;
 impl ManifestEntry {
     /// The entry in a line; `None` where there is none, or where it names a result outside its directory.
     pub(crate) fn of_line(line: &[u8]) -> Option<Self> {
-        let entry: Self = serde_json::from_slice(line).ok()?;
+        let mut entry: Self = serde_json::from_slice(line).ok()?;
+        if let Cow::Owned(options) = with_present_names(&entry.options) {
+            entry.options = options;
+        }
         let all = entry.one_of.as_ref().map(|(all, _)| &**all);
         (is_beneath(&entry.output) && all.is_none_or(is_beneath)).then_some(entry)
     }
@@ -269,6 +296,29 @@ impl ManifestLines {
             }
         }
         lines
+    }
+
+    /// The lines of a directory's manifest, and whether there is a file of its name; none of a file that is no
+    /// manifest, if it may be replaced.
+    pub(crate) fn of_folder(folder: &Path, overwrite: bool) -> Result<(Self, bool), Failure> {
+        let mut bytes = Vec::new();
+        let exists = match open(folder) {
+            Ok(None) => false,
+            Ok(Some(mut file)) => {
+                let read = file.read_to_end(&mut bytes);
+                read.map_err(|error| {
+                    let path = folder.join(NAME);
+                    let message = format!("{}: cannot be read: {error}", path.display());
+                    Failure::new(OUTPUT, message)
+                })?;
+                true
+            }
+            Err(_) if overwrite && folder.join(NAME).is_file() => true,
+            Err(failure) => return Err(failure),
+        };
+        let lines = Self::parse(&bytes);
+        warn_of_damaged_lines(folder, lines.damaged);
+        Ok((lines, exists))
     }
 
     /// Adds later lines.
@@ -427,6 +477,16 @@ impl PreviousEntries {
             entries: Arc::new(entries),
             unfinished: Arc::new(unfinished),
         }
+    }
+
+    /// The directory of results.
+    pub(crate) fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// All entries, by the names of their results.
+    pub(crate) fn entries(&self) -> &BTreeMap<String, ManifestEntry> {
+        &self.entries
     }
 
     /// The entry of an output, or the entries of its clips.

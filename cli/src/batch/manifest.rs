@@ -13,7 +13,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{File, TryLockError};
-use std::io::{self, Read, Write};
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -23,7 +23,7 @@ use tumble_formats::output::{Output, OutputError};
 
 use crate::batch::digest;
 use crate::batch::entry::{
-    self, BatchStart, InputEntries, InputEntry, InputState, ManifestEntry, ManifestLines, NAME,
+    BatchStart, InputEntries, InputEntry, InputState, ManifestEntry, ManifestLines, NAME,
     PreviousEntries, ResultRecorder, line, of_clips,
 };
 use crate::batch::owner::Owner;
@@ -43,14 +43,8 @@ pub(crate) struct Manifest {
     added: BTreeMap<String, ManifestEntry>,
     /// The inputs without results, or without all of them, as they are now.
     inputs: InputEntries,
-    /// The results of this batch's inputs, each of all clips.
-    planned: BTreeSet<String>,
-    /// The results of this batch's inputs, by the inputs' paths.
-    planned_of: BTreeMap<String, String>,
-    /// Those of `planned` whose files have all been made.
-    ended: BTreeSet<String>,
-    /// Those of `planned` that were complete already.
-    complete: BTreeSet<String>,
+    /// The results of this batch's inputs.
+    planned: PlannedResults,
     /// Whether results without an input are removed.
     prune: bool,
     /// Whether there is a file of its name: a manifest, or a file to replace.
@@ -61,6 +55,78 @@ pub(crate) struct Manifest {
     has_shards: bool,
     /// Locks the directory: two batches would lose each other's lines.
     _lock: Option<File>,
+}
+
+/// The results of a batch's inputs, each of all clips of its input: they decide which earlier results have no input
+/// any more.
+#[derive(Default)]
+pub(crate) struct PlannedResults {
+    names: BTreeSet<String>,
+    /// By the inputs' paths.
+    of_inputs: BTreeMap<String, String>,
+    /// Those whose files have all been made.
+    ended: BTreeSet<String>,
+    /// Those that were complete already.
+    complete: BTreeSet<String>,
+}
+
+impl PlannedResults {
+    /// Adds the result of an input.
+    pub(super) fn plan(&mut self, input: &Path, result: &str) {
+        let input = input.display().to_string();
+        self.of_inputs.insert(input, result.to_owned());
+        self.names.insert(result.to_owned());
+    }
+
+    /// The files of a result are all made.
+    pub(super) fn end(&mut self, result: &str) {
+        self.ended.insert(result.to_owned());
+    }
+
+    /// A result was complete already.
+    pub(super) fn complete(&mut self, result: &str) {
+        self.complete.insert(result.to_owned());
+    }
+
+    /// Whether this batch gives the result of an input another name than this one, of the same format.
+    fn is_renamed(&self, input: &str, result: &str) -> bool {
+        let ending = |name: &str| Path::new(name).extension().map(ToOwned::to_owned);
+        self.of_inputs
+            .get(input)
+            .is_some_and(|planned| planned != result && ending(planned) == ending(result))
+    }
+
+    /// Whether a result has no input any more: the input is gone, has other clips than before, or its result has
+    /// another name now. `is_made`: the batch has made it. `previous` are the results before the batch.
+    pub(super) fn is_orphan(
+        &self,
+        entry: &ManifestEntry,
+        is_made: bool,
+        previous: &BTreeMap<String, ManifestEntry>,
+    ) -> bool {
+        let whole = entry.whole().0;
+        if self.complete.contains(whole) {
+            // Of a file that had several clips, and has one now.
+            return entry.output != whole && previous.contains_key(whole);
+        }
+        match self.names.contains(whole) {
+            true => self.ended.contains(whole) && !is_made,
+            false => {
+                self.is_renamed(&entry.input, whole)
+                    || InputPresence::of_entry(entry) == InputPresence::Removed
+            }
+        }
+    }
+
+    /// Why a result has no input any more.
+    pub(super) fn why_orphan(&self, entry: &ManifestEntry) -> &'static str {
+        let whole = entry.whole().0;
+        match self.is_renamed(&entry.input, whole) {
+            true => "its input's result has another name now",
+            false if self.names.contains(whole) => "its input has no such clip any more",
+            false => "its input is gone",
+        }
+    }
 }
 
 /// How the manifest of a directory is opened.
@@ -99,25 +165,7 @@ impl Manifest {
         } = options;
         let opened = target::opened(folder)?;
         let lock = lock(&opened)?;
-        let mut bytes = Vec::new();
-        let exists = match entry::open(folder) {
-            Ok(None) => false,
-            Ok(Some(mut file)) => {
-                let read = file.read_to_end(&mut bytes);
-                read.map_err(|error| {
-                    let path = folder.join(NAME);
-                    Failure::new(
-                        OUTPUT,
-                        format!("{}: cannot be read: {error}", path.display()),
-                    )
-                })?;
-                true
-            }
-            Err(_) if overwrite && folder.join(NAME).is_file() => true,
-            Err(failure) => return Err(failure),
-        };
-        let mut lines = ManifestLines::parse(&bytes);
-        entry::warn_of_damaged_lines(folder, lines.damaged);
+        let (mut lines, exists) = ManifestLines::of_folder(folder, overwrite)?;
         if has_shards {
             lines.extend(record::lines(folder));
         }
@@ -128,10 +176,7 @@ impl Manifest {
             previous: Arc::new(lines.entries),
             added: BTreeMap::new(),
             inputs: lines.inputs,
-            planned: BTreeSet::new(),
-            planned_of: BTreeMap::new(),
-            ended: BTreeSet::new(),
-            complete: BTreeSet::new(),
+            planned: PlannedResults::default(),
             prune,
             exists,
             journal: None,
@@ -217,7 +262,7 @@ impl Manifest {
         if !self.prune {
             let of_other_name = |output: &&String| {
                 let entry = self.results()[&***output];
-                self.is_renamed(&entry.input, entry.whole().0)
+                self.planned.is_renamed(&entry.input, entry.whole().0)
             };
             let (renamed, orphaned): (Vec<&String>, Vec<&String>) =
                 orphans.iter().partition(of_other_name);
@@ -249,41 +294,21 @@ impl Manifest {
         }
     }
 
-    /// The results that have no input any more: the input is gone, has other clips than before, or its result has
-    /// another name now.
+    /// The results that have no input any more.
     fn orphans(&self) -> BTreeSet<String> {
-        let is_orphan = |entry: &ManifestEntry| {
-            let whole = entry.whole().0;
-            if self.complete.contains(whole) {
-                // The file had several clips before, and has one now.
-                return entry.output != whole && self.previous.contains_key(whole);
-            }
-            match self.planned.contains(whole) {
-                true => self.ended.contains(whole) && !self.added.contains_key(&entry.output),
-                false => {
-                    self.is_renamed(&entry.input, whole)
-                        || InputPresence::of_entry(entry) == InputPresence::Removed
-                }
-            }
+        let is_orphan = |entry: &&ManifestEntry| {
+            let is_made = self.added.contains_key(&entry.output);
+            self.planned.is_orphan(entry, is_made, &self.previous)
         };
-        let results = self.results().into_values();
-        let orphans = results.filter(|entry| is_orphan(entry));
+        let orphans = self.results().into_values().filter(is_orphan);
         orphans.map(|entry| entry.output.clone()).collect()
-    }
-
-    /// Whether this batch gives the result of an input another name than this one, of the same format.
-    fn is_renamed(&self, input: &str, result: &str) -> bool {
-        let ending = |name: &str| Path::new(name).extension().map(ToOwned::to_owned);
-        self.planned_of
-            .get(input)
-            .is_some_and(|planned| planned != result && ending(planned) == ending(result))
     }
 
     /// Says which results `--prune` keeps because it cannot know whether their inputs are gone.
     fn note_unknown(&self) {
         let results = self.results().into_values();
         let unknown = results.filter(|entry| {
-            !self.planned.contains(entry.whole().0)
+            !self.planned.names.contains(entry.whole().0)
                 && InputPresence::of_entry(entry) == InputPresence::Unknown
         });
         let unknown: Vec<&ManifestEntry> = unknown.collect();
@@ -323,10 +348,7 @@ impl Manifest {
                         .is_some_and(|parent| self.opened.remove_folder(parent).is_ok())
                     {
                     }
-                    let why = match self.is_renamed(&entry.input, entry.whole().0) {
-                        true => "its input's result has another name now",
-                        false => "its input is gone",
-                    };
+                    let why = self.planned.why_orphan(entry);
                     words::note(&format!("{shown}: removed; {why}"));
                 }
                 Err(error) if error.kind() == io::ErrorKind::NotFound => {}
@@ -467,8 +489,7 @@ impl ResultRecorder for Manifest {
         let mut forgotten = Vec::new();
         let prune = self.prune;
         for (input, result) in &start.inputs {
-            let input = input.display().to_string();
-            self.planned_of.insert(input, (*result).to_owned());
+            self.planned.plan(input, result);
         }
         let mut inputs = std::mem::take(&mut self.inputs);
         inputs.retain(|_, entry| match InputPresence::of_input(entry) {
@@ -477,7 +498,7 @@ impl ResultRecorder for Manifest {
             _ if has_files(Path::new(&entry.input)) => false,
             // Its result has another name now.
             _ if (entry.result.as_deref())
-                .is_some_and(|result| self.is_renamed(&entry.input, result)) =>
+                .is_some_and(|result| self.planned.is_renamed(&entry.input, result)) =>
             {
                 false
             }
@@ -508,7 +529,6 @@ impl ResultRecorder for Manifest {
         };
         let mut has_pending = false;
         for (input, result) in start.inputs {
-            self.planned.insert(result.to_owned());
             if !(start.resume && is_same(result)) || self.unfinished.contains(result) {
                 let entry = InputEntry::pending(input, result);
                 self.inputs.insert(entry.key(), entry);
@@ -532,12 +552,12 @@ impl ResultRecorder for Manifest {
     }
 
     fn skip(&mut self, output: &str) {
-        self.complete.insert(output.to_owned());
+        self.planned.complete(output);
         self.inputs.remove(output);
     }
 
     fn end_input(&mut self, output: &str) {
-        self.ended.insert(output.to_owned());
+        self.planned.end(output);
     }
 
     fn refuse(&mut self, entry: InputEntry) -> Result<(), Failure> {
@@ -558,7 +578,7 @@ impl ResultRecorder for Manifest {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::batch::entry::kernels_sha256;
+    use crate::batch::entry::{FrameNotes, kernels_sha256};
 
     fn entry(output: &str, hash: &str) -> ManifestEntry {
         let text = String::from;
@@ -574,6 +594,7 @@ mod tests {
             tumble: text(env!("CARGO_PKG_VERSION")),
             device: text("CPU"),
             one_of: None,
+            frames: FrameNotes::default(),
             warnings: Vec::new(),
         }
     }
@@ -625,6 +646,22 @@ mod tests {
         let text = |path| std::fs::read_to_string(path).unwrap();
         assert_eq!(text(&other), line(&entry("a", "1")));
         assert_eq!(text(&path).lines().count(), 3);
+    }
+
+    /// A manifest is written again with every batch: its numbers stay, and lines of before have none.
+    #[test]
+    fn notes_about_frames_are_read_as_they_were_written() {
+        let mut noted = entry("a", "1");
+        noted.frames = FrameNotes::new(Some("25".to_owned()), Some(0.6 / 7.3));
+        let text = line(&noted);
+        assert!(
+            text.contains(r#""assumed_fps":"25","left_out_seconds":0.082191781"#),
+            "{text}"
+        );
+        let read = ManifestEntry::of_line(text.as_bytes()).unwrap();
+        assert_eq!((&read, line(&read)), (&noted, text));
+        let plain = line(&entry("a", "1"));
+        assert!(!plain.contains("assumed_fps"), "{plain}");
     }
 
     #[test]

@@ -6,6 +6,7 @@ pub(crate) mod manifest;
 pub(crate) mod output_plan;
 pub(crate) mod owner;
 pub(crate) mod pipeline;
+pub(crate) mod preview;
 pub(crate) mod result_names;
 pub(crate) mod room;
 pub(crate) mod shards;

@@ -4,15 +4,12 @@
 //! An input whose result cannot have a name or a file there has failed; the others are evaluated.
 
 use std::collections::{BTreeSet, HashSet};
-use std::fmt;
 use std::io::{self, IsTerminal};
 use std::path::{Path, PathBuf};
 
-use serde::Serialize;
 use tumble_formats::folder::Folder;
 use tumble_formats::format::Format;
 use tumble_formats::output::remove_abandoned;
-use tumble_formats::printable::printable;
 
 use crate::arguments::input::{FoundInput, GatheredInputs};
 use crate::batch::entry::{self, InputEntry};
@@ -55,83 +52,8 @@ pub(crate) struct OutputOptions<'a> {
     pub(crate) naming: ResultNaming,
 }
 
-/// A result that a batch would write, as `--dry-run` lists it.
-#[derive(Debug, Serialize)]
-pub(crate) struct PlannedResult {
-    state: &'static str,
-    input: String,
-    output: String,
-    /// Whether a file of that name is there.
-    exists: bool,
-    /// Whether that file is the result of an earlier batch, which is made again only if something has changed.
-    #[serde(skip)]
-    is_resumed: bool,
-}
-
-impl fmt::Display for PlannedResult {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "{} → {}",
-            printable(&self.input),
-            printable(&self.output)
-        )?;
-        match (self.exists, self.is_resumed) {
-            (true, true) => write!(f, " (exists; made again if its input or an option changed)"),
-            (true, false) => write!(f, " (replaces a file)"),
-            (false, _) => Ok(()),
-        }
-    }
-}
-
-/// The results that [`plan`] would have targets for, and the inputs that it would refuse. Creates nothing.
-pub(crate) fn preview(
-    inputs: &GatheredInputs,
-    options: OutputOptions<'_>,
-) -> Result<(Vec<PlannedResult>, Vec<UnplannedInput>), Failure> {
-    let out = options.out.unwrap_or(Path::new("-"));
-    let planned = |input: &Path, output: &Path, is_resumed: bool| PlannedResult {
-        state: "planned",
-        input: names::input(input),
-        output: output.display().to_string(),
-        exists: !names::is_standard(output) && std::fs::symlink_metadata(output).is_ok(),
-        is_resumed,
-    };
-    if let [path] = &*inputs.paths()
-        && goes_to_file(inputs, out)
-    {
-        Destination::new(out, options.overwrite, std::slice::from_ref(path))?;
-        choose(out, options.format)?;
-        return Ok((vec![planned(path, out, false)], Vec::new()));
-    }
-    let format = format(out, options.format)?;
-    let files = without_results(inputs.files.clone(), out)?;
-    let recorded = record::names(out);
-    let (mut results, mut refused) = (Vec::new(), Vec::new());
-    for (found, name) in files
-        .iter()
-        .zip(name_results(&files, out, format, options.naming))
-    {
-        let result = name.and_then(|name| {
-            let is_resumed = options.resume && recorded.contains(&name);
-            if !options.overwrite && !is_resumed {
-                refuse_existing(out, &name, recorded.contains(&name))?;
-            }
-            Ok(planned(&found.path, &out.join(name), is_resumed))
-        });
-        match result {
-            Ok(result) => results.push(result),
-            Err(failure) => refused.push(UnplannedInput {
-                path: found.path.clone(),
-                failure,
-            }),
-        }
-    }
-    Ok((results, refused))
-}
-
 /// Whether a single input's result is one file, and not a file in a directory.
-fn goes_to_file(inputs: &GatheredInputs, out: &Path) -> bool {
+pub(super) fn goes_to_file(inputs: &GatheredInputs, out: &Path) -> bool {
     let is_file = out.is_file() || of(out).is_some() || names::is_standard(out);
     let is_folder = out.is_dir() || out.as_os_str().as_encoded_bytes().ends_with(b"/");
     is_file || !inputs.many && !is_folder
@@ -309,7 +231,7 @@ pub(crate) fn without_results(
 }
 
 /// Refuses, before any work, a batch that would replace a file without `--overwrite`.
-fn refuse_existing(folder: &Path, name: &str, is_known: bool) -> Result<(), Failure> {
+pub(super) fn refuse_existing(folder: &Path, name: &str, is_known: bool) -> Result<(), Failure> {
     let path = folder.join(name);
     if std::fs::symlink_metadata(&path).is_err() {
         return Ok(());
@@ -323,7 +245,7 @@ fn refuse_existing(folder: &Path, name: &str, is_known: bool) -> Result<(), Fail
 }
 
 /// Refuses other inputs for a directory with shards that are not merged yet.
-fn refuse_shards(
+pub(super) fn refuse_shards(
     recorded: &RecordedPlan,
     names: &[ResultName],
     folder: &Path,

@@ -25,14 +25,14 @@ use std::time::Instant;
 use serde::Serialize;
 use serde_json::{Value, json};
 use tumble_formats::motion::Motion;
-use tumble_formats::{Diagnostic, Feature, Loaded};
+use tumble_formats::{Diagnostic, Feature, Limits, Loaded};
 
 use crate::arguments::input::{InputReader, check_complete, print_warnings, several_clips_failure};
 use crate::arguments::options::ResultOptions;
 use crate::batch::digest::InputFile;
 use crate::batch::entry::{
-    BatchStart, InputEntry, ManifestEntry, PreviousEntries, RecordedWarning, ResultRecorder,
-    kernels_sha256,
+    BatchStart, FrameNotes, InputEntry, ManifestEntry, PreviousEntries, RecordedWarning,
+    ResultRecorder, kernels_sha256,
 };
 use crate::batch::output_plan::UnplannedInput;
 use crate::batch::owner::{Owner, ReplacedOwners};
@@ -75,6 +75,7 @@ pub(crate) struct EvaluatedResult {
     pub(crate) written: WrittenFile,
     pub(crate) device: String,
     pub(crate) message: String,
+    pub(crate) frames: FrameNotes,
 }
 
 /// An input that was read.
@@ -155,6 +156,7 @@ impl ClipWork {
             written,
             device: device.unwrap_or("none").to_owned(),
             message: format!("{name}: {done}{on_device} in {spent} → {target}{sizes}"),
+            frames: FrameNotes::default(),
         }
     }
 }
@@ -221,7 +223,9 @@ struct BatchRecords<'a> {
     /// The inputs with all their results, and those with some of them.
     done: usize,
     done_in_part: usize,
+    /// The inputs whose results were complete, and how many results these are.
     skipped: usize,
+    skipped_results: usize,
     failed: usize,
 }
 
@@ -301,6 +305,7 @@ impl<'a> Pipeline<'a> {
             done: 0,
             done_in_part: 0,
             skipped: 0,
+            skipped_results: 0,
             failed: 0,
         };
         let (hand_over, read_jobs) = sync_channel(0);
@@ -454,15 +459,7 @@ impl<'a> Pipeline<'a> {
             batch.left.remove(&path);
         }
         let Some((file, loaded)) = input else {
-            if let Some(batch) = &mut self.batch {
-                batch.skipped += 1;
-                batch.progress.advance(1);
-                batch.records.skip(target.name());
-            }
-            if let Some(json) = &mut self.json {
-                let (input, output) = (names::input(&path), target.path().display().to_string());
-                json.push(json!({"state": "kept", "input": input, "output": output}));
-            }
+            self.skip(&path, &target);
             return;
         };
         let files = loaded.and_then(|loaded| {
@@ -498,6 +495,29 @@ impl<'a> Pipeline<'a> {
                 });
             }
             Err(failure) => self.add(&path, Some(target.name()), Err(failure)),
+        }
+    }
+
+    /// The results of an input are complete.
+    fn skip(&mut self, path: &Path, target: &ResultTarget) {
+        let Some(batch) = &mut self.batch else {
+            return;
+        };
+        let folder = batch.previous.folder();
+        let kept = batch.previous.results_of(target.name());
+        let records = kept.map(|entry| KeptResult {
+            state: "kept",
+            input: names::input(path),
+            output: folder.join(&entry.output).display().to_string(),
+            frames: &entry.frames,
+        });
+        let records: Vec<Value> = records.map(|record| to_json(&record)).collect();
+        batch.skipped += 1;
+        batch.skipped_results += records.len();
+        batch.progress.advance(1);
+        batch.records.skip(target.name());
+        if let Some(json) = &mut self.json {
+            json.extend(records);
         }
     }
 
@@ -603,9 +623,19 @@ impl<'a> Pipeline<'a> {
     }
 }
 
-/// An input without a result in JSON.
-fn to_json(entry: &InputEntry) -> Value {
-    serde_json::to_value(entry).expect("strings and numbers")
+/// A result that was complete before the batch, in JSON.
+#[derive(Serialize)]
+struct KeptResult<'a> {
+    state: &'static str,
+    input: String,
+    output: String,
+    #[serde(flatten)]
+    frames: &'a FrameNotes,
+}
+
+/// A record in JSON: an input without a result, or a result that is kept.
+fn to_json(record: &impl Serialize) -> Value {
+    serde_json::to_value(record).expect("strings and numbers")
 }
 
 /// The records of a result in JSON.
@@ -716,6 +746,7 @@ impl BatchRecords<'_> {
             tumble: env!("CARGO_PKG_VERSION").to_owned(),
             device: result.device,
             one_of: (name != whole).then(|| (whole.to_owned(), clips)),
+            frames: result.frames,
             warnings,
         };
         let kept = self.records.keep(entry, result.written);
@@ -748,8 +779,11 @@ impl BatchRecords<'_> {
         }
         let mut parts = vec![made];
         if self.skipped > 0 {
-            let results = words::count(self.skipped, "result");
-            parts.push(format!("{results} skipped (already complete)"));
+            let mut skipped = words::count(self.skipped_results, "result");
+            if self.skipped_results != self.skipped {
+                skipped += &format!(" of {}", words::count(self.skipped, "input"));
+            }
+            parts.push(format!("{skipped} skipped (already complete)"));
         }
         if self.failed > 0 {
             parts.push(format!("{} failed", words::count(self.failed, "input")));
@@ -794,9 +828,7 @@ impl<R: InputReader> ReadingAhead<R> {
         let limits = self.reader.limits();
         let file = InputFile::within(path, limits);
         let is_done = |hash: &str| self.previous.is_done(target.name(), hash, &self.options);
-        // The hash is of the bytes that are read next; longer inputs are refused.
-        let is_read = std::fs::metadata(path).is_ok_and(|found| found.len() <= limits.file);
-        let sha256 = is_read.then(|| file.sha256()).flatten();
+        let sha256 = hash_before_reading(&file, limits);
         if self.resume && sha256.is_some_and(is_done) {
             return None;
         }
@@ -805,6 +837,15 @@ impl<R: InputReader> ReadingAhead<R> {
         Some((file, loaded))
     }
 }
+
+/// The hash of an input's bytes, which are read next; longer inputs are refused.
+pub(super) fn hash_before_reading(file: &InputFile, limits: Limits) -> Option<&str> {
+    let is_read = std::fs::metadata(file.path()).is_ok_and(|found| found.len() <= limits.file);
+    is_read.then(|| file.sha256()).flatten()
+}
+
+/// For an input with several clips whose result is one file of one clip.
+pub(super) const SEVERAL_CLIPS_REMEDY: &str = ", or give a directory for all of them: -o RESULTS/";
 
 /// A file to write: which of the input's clips go into it.
 pub(super) struct ClipFile {
@@ -829,10 +870,9 @@ pub(super) fn clip_files(
         })]));
     }
     if target.name().is_empty() {
-        let hint = ", or give a directory for all of them: -o RESULTS/";
-        return Err(several_clips_failure(path, loaded).hinted(hint));
+        return Err(several_clips_failure(path, loaded).hinted(SEVERAL_CLIPS_REMEDY));
     }
-    let file_names = file_names(clips).into_iter();
+    let file_names = clip_file_names(clips).into_iter();
     let files = clips.iter().zip(file_names).enumerate();
     Ok(files
         .map(|(index, (clip, file))| {
@@ -847,7 +887,7 @@ pub(super) fn clip_files(
 
 /// The names of the clips' files: the clips' names, with characters that file systems refuse replaced;
 /// names that are then equal get the clip's index appended.
-fn file_names(clips: &[Motion]) -> Vec<String> {
+pub(super) fn clip_file_names(clips: &[Motion]) -> Vec<String> {
     let is_plain = |c: char| c.is_alphanumeric() || matches!(c, '-' | '_' | '.' | ' ');
     let plain = |clip: &Motion| -> String {
         let name = clip.name.clone().unwrap_or_else(|| clip.index.to_string());
@@ -906,7 +946,7 @@ mod tests {
             })
             .collect();
         assert_eq!(
-            file_names(&clips),
+            clip_file_names(&clips),
             ["Run", "run.1", "a_b", "a_b.3", "4", "4.5"]
         );
     }
@@ -919,7 +959,7 @@ mod tests {
             index,
             ..Motion::default()
         };
-        let names = file_names(&[clip(0), clip(1)]);
+        let names = clip_file_names(&[clip(0), clip(1)]);
         assert_eq!(names[0], format!("{}.0", "ä".repeat(59)));
         assert_eq!(names[1], format!("{}.1", "ä".repeat(59)));
     }

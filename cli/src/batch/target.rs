@@ -92,6 +92,17 @@ pub(crate) fn refuse_both_on_standard(prints_json: bool, out: &Path) -> Result<(
     }
 }
 
+fn path_of_clip(path: &Path, clip: &str, format: &Format) -> PathBuf {
+    path.with_extension(format!("{clip}.{}", format.name))
+}
+
+/// The name of the result of one of several clips, from that of all: `fox.npy` becomes `fox.Run.npy`.
+pub(super) fn name_of_clip(name: &str, clip: &str, format: &Format) -> String {
+    path_of_clip(Path::new(name), clip, format)
+        .display()
+        .to_string()
+}
+
 /// The target of one result: its destination and format.
 #[derive(Clone)]
 pub(crate) struct ResultTarget {
@@ -162,14 +173,10 @@ impl ResultTarget {
 
     /// The target of one of several clips of an input, beside that of all: `fox.npy` becomes `fox.Run.npy`.
     pub(crate) fn of_clip(&self, clip: &str) -> Result<Self, Failure> {
-        let with = |path: &Path| path.with_extension(format!("{clip}.{}", self.format.name));
-        let name = with(Path::new(&self.name));
+        let with = |path: &Path| path_of_clip(path, clip, self.format);
+        let name = name_of_clip(&self.name, clip, self.format);
         let destination = self.destination.renamed(with)?;
-        Ok(Self::new(
-            destination,
-            self.format,
-            name.display().to_string(),
-        ))
+        Ok(Self::new(destination, self.format, name))
     }
 
     /// Refuses a result for which the disk has no room.

@@ -16,7 +16,7 @@ use crate::batch::manifest::InputPresence;
 use crate::batch::shards::merge::ShardProgress;
 use crate::batch::shards::plan::RecordedPlan;
 use crate::batch::shards::record;
-use crate::messages::exit::{ALL_INPUTS, DIFFERENCE, Failure};
+use crate::messages::exit::{ALL_INPUTS, DIFFERENCE, FailedInputs, Failure};
 use crate::messages::listing;
 use crate::messages::progress::busy;
 use crate::messages::words;
@@ -220,9 +220,10 @@ fn unfinished(lines: &ManifestLines) -> Vec<String> {
     let UnfinishedInputs { failed, pending } = lines.unfinished_inputs();
     let mut texts = Vec::new();
     if let Some(first) = failed.first() {
-        let inputs = words::count(failed.len(), "input");
+        let count = FailedInputs::of_codes(failed.iter().map(|entry| entry.code));
         let message = first.message.as_deref().unwrap_or_default();
-        texts.push(format!("{inputs} failed (the first: {message})"));
+        let count = count.text().unwrap_or_default();
+        texts.push(format!("{count} (the first: {message})"));
     }
     if let Some(first) = pending.first() {
         let inputs = words::count(pending.len(), "input");

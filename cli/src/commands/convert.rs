@@ -21,6 +21,7 @@ use crate::arguments::results::{
 use crate::arguments::robot::{DialectArguments, RobotFrames};
 use crate::arguments::time::{check_range, finite_seconds};
 use crate::batch::pipeline::{ClipWork, EvaluatedResult};
+use crate::batch::preview::PlannedWork;
 use crate::batch::target::ResultTarget;
 use crate::messages::exit::{ALL_INPUTS, Failure};
 use crate::messages::words;
@@ -68,7 +69,13 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let files = arguments.inputs.gather(false)?;
     let asked = arguments.dialect.format(&arguments.results)?;
     arguments.inputs.reading.robot()?;
-    let plan = arguments.results.plan_in(files, asked)?;
+    let options = arguments.command_line.options().of_command("convert");
+    let reader = arguments.inputs.clone();
+    let work = PlannedWork {
+        reader: &reader,
+        options: &options,
+    };
+    let plan = arguments.results.plan_in(files, asked, &work)?;
     match arguments.dialect.chosen() {
         None => {
             check_stores_keys(&plan)?;
@@ -100,8 +107,6 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         )));
     }
     check_sequence(arguments.sequence, format)?;
-    let options = arguments.command_line.options().of_command("convert");
-    let reader = arguments.inputs.clone();
     let mut pipeline = arguments.results.start(reader, plan, options);
     while let Some(work) = pipeline.next_work() {
         let converted = arguments.convert(&work);

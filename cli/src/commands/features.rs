@@ -24,6 +24,7 @@ use crate::arguments::options::CommandLine;
 use crate::arguments::output::one_of;
 use crate::arguments::results::ResultArguments;
 use crate::batch::pipeline::{ClipWork, EvaluatedResult};
+use crate::batch::preview::PlannedWork;
 use crate::messages::exit::{ALL_INPUTS, Failure};
 use crate::messages::words;
 
@@ -59,16 +60,16 @@ pub(crate) struct Arguments {
     /// The axis that points up, for headings and contacts
     #[arg(long, value_name = "AXIS", default_value = "y", value_parser = vertical())]
     vertical: Ground,
-    /// A joint that is lower touches the ground, if it is slower too; metres
+    /// The height below which a slow joint touches the ground, metres
     #[arg(long, value_name = "METRES", default_value_t = ContactLimits::PROTOMOTIONS.height)]
     contact_height: f64,
-    /// A joint that is slower touches the ground, if it is lower too; metres a second
+    /// The speed below which a low joint touches the ground, metres a second
     #[arg(long, value_name = "SPEED", default_value_t = ContactLimits::PROTOMOTIONS.speed)]
     contact_speed: f64,
     /// Replace each contact by the majority of this many frames around it, an odd number
     #[arg(long, value_name = "FRAMES", default_value_t = 1)]
     contact_window: usize,
-    /// The axis across the mirror
+    /// The axis whose direction the mirror reverses
     #[arg(long, value_name = "AXIS", default_value = "x", value_parser = mirror_axis())]
     mirror_axis: usize,
 }
@@ -140,9 +141,13 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         return Err(Failure::usage(message));
     }
     arguments.inputs.reading.robot()?;
-    let plan = arguments.results.plan_in(files, format)?;
     let options = arguments.command_line.options().of_command("features");
     let reader = arguments.inputs.clone();
+    let work = PlannedWork {
+        reader: &reader,
+        options: &options,
+    };
+    let plan = arguments.results.plan_in(files, format, &work)?;
     let engine =
         Engine::new(Device::Cpu).map_err(|error| Failure::evaluating("features", &error))?;
     let mut pipeline = arguments.results.start(reader, plan, options);

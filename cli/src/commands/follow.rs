@@ -20,6 +20,7 @@ use crate::arguments::path::PathArguments;
 use crate::arguments::results::ResultArguments;
 use crate::arguments::time::{SampleChoice, SamplingArguments};
 use crate::batch::pipeline::{ClipWork, EvaluatedResult};
+use crate::batch::preview::PlannedWork;
 use crate::batch::room;
 use crate::batch::target::{ResultTarget, WrittenFile};
 use crate::messages::exit::{ALL_INPUTS, Failure};
@@ -54,7 +55,7 @@ fn kinds() -> String {
     mut_arg("path_ends", |arg| arg.alias("ends")),
     mut_arg("path_up", |arg| arg.alias("up")),
     mut_arg("path_speed", |arg| arg.alias("speed")),
-    mut_arg("path_frames", |arg| {
+    mut_arg("path_frame", |arg| {
         let arg = arg.value_name("FRAME").help("The orientation about this direction");
         arg.action(ArgAction::Set).value_delimiter(None::<char>)
     })
@@ -79,10 +80,14 @@ pub(crate) struct Arguments {
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let inputs = GatheredInputs::new(&arguments.paths, &InputSelection::default())?;
     let samples = arguments.sampling.samples()?;
-    let plan = arguments.results.plan(inputs)?;
-    let mut device = arguments.device.open()?;
     let options = arguments.options(&samples);
     let reader = arguments.path.clone();
+    let work = PlannedWork {
+        reader: &reader,
+        options: &options,
+    };
+    let plan = arguments.results.plan(inputs, &work)?;
+    let mut device = arguments.device.open()?;
     let mut pipeline = arguments.results.start(reader, plan, options);
     while let Some(work) = pipeline.next_work() {
         let made = arguments.body(&work, &samples, &mut device);

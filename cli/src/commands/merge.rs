@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use crate::batch::shards::merge::{MergeSummary, merge};
 use crate::batch::shards::record::RefusedInput;
-use crate::messages::exit::{ALL_INPUTS, Failure, SOME_INPUTS};
+use crate::messages::exit::{FailedInputs, Failure};
 use crate::messages::listing;
 use crate::messages::progress::busy;
 use crate::messages::words;
@@ -64,19 +64,11 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
     let all = words::count(results, "result");
     words::note(&format!(
-        "{}: {all} of {}",
+        "{}: {all} of {}, from {}",
         folder.display(),
+        words::count(inputs, "input"),
         words::count(shards, "shard")
     ));
-    match failed.len() {
-        0 => Ok(()),
-        _ if failed.len() == inputs => Err(Failure::new(
-            ALL_INPUTS,
-            format!("all {inputs} inputs failed"),
-        )),
-        failed => {
-            let message = format!("{failed} of {inputs} inputs failed; the others are done");
-            Err(Failure::new(SOME_INPUTS, message))
-        }
-    }
+    let codes = failed.iter().map(|refused| Some(refused.code));
+    FailedInputs::of_codes(codes).outcome_of(inputs)
 }

@@ -20,6 +20,7 @@ use crate::arguments::options::CommandLine;
 use crate::arguments::output::{one_of, sequence};
 use crate::arguments::results::{ResultArguments, check_sequence, check_stores_keys, write_keys};
 use crate::batch::pipeline::{ClipWork, EvaluatedResult};
+use crate::batch::preview::PlannedWork;
 use crate::batch::target::{Destination, ResultTarget, WrittenFile};
 use crate::messages::exit::{ALL_INPUTS, Failure};
 use crate::messages::words;
@@ -75,8 +76,10 @@ pub(crate) struct Arguments {
 fn rest() -> impl TypedValueParser<Value = RestAlignment> {
     let help = |rest| match rest {
         RestAlignment::Auto => "directions, if one of a limb differs by more than 5°, else same",
-        RestAlignment::Same => "both stand alike",
-        RestAlignment::Directions => "arms and legs are turned to the directions of the input's",
+        RestAlignment::Same => "the same rotations are the same pose",
+        RestAlignment::Directions => {
+            "the arms and legs of the skeleton are first turned to the directions that the input's have"
+        }
     };
     one_of(RestAlignment::ALL.map(|rest| (rest.name(), help(rest), rest)))
 }
@@ -92,7 +95,13 @@ fn hips_scale(text: &str) -> Result<HipsScale, String> {
 
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let files = arguments.inputs.gather(false)?;
-    let plan = arguments.results.plan(files)?;
+    let results = arguments.command_line.options().of_command("retarget");
+    let reader = arguments.inputs.clone();
+    let work = PlannedWork {
+        reader: &reader,
+        options: &results,
+    };
+    let plan = arguments.results.plan(files, &work)?;
     check_stores_keys(&plan)?;
     check_sequence(
         arguments.sequence,
@@ -110,8 +119,6 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     };
     let limits = arguments.inputs.limits();
     let character = Character::open(&arguments.onto, limits)?;
-    let results = arguments.command_line.options().of_command("retarget");
-    let reader = arguments.inputs.clone();
     let mut pipeline = arguments.results.start(reader, plan, results);
     while let Some(work) = pipeline.next_work() {
         let made = arguments.make(&work, &character, &options, report.as_ref());

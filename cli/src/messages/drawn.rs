@@ -4,8 +4,9 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
+use tumble_formats::motion::Motion;
 
-use crate::messages::names;
+use crate::messages::{names, words};
 
 /// A picture, a film or a page, as `--json` prints it.
 #[derive(Debug, Clone, Serialize)]
@@ -40,6 +41,18 @@ impl DrawnFile {
             frames: Some(frames),
             ..self
         }
+    }
+}
+
+/// Says how many scalars of a clip are not drawn.
+pub(crate) fn note_scalars(name: &str, clip: &Motion) {
+    let count = clip.set.scalar_count();
+    if count > 0 {
+        let are = if count == 1 { "is" } else { "are" };
+        words::note(&format!(
+            "{name}: {} {are} not drawn (`tumble eval --quantity scalars -o FILE.csv` writes them)",
+            words::count(count, "scalar")
+        ));
     }
 }
 

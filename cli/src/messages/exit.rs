@@ -304,26 +304,68 @@ impl Outcomes {
 
     /// The outcome of the command.
     pub(crate) fn finish(self) -> Result<(), Failure> {
-        let (failed, total) = (self.failed, self.total);
-        match (self.end, failed + self.failed_in_part) {
-            (Some(failure), _) => Err(failure),
-            (None, 0) => Ok(()),
-            _ if failed == total => Err(Failure::new(
-                ALL_INPUTS,
-                format!("all {failed} inputs failed"),
-            )),
-            _ => {
-                let failures = match (failed, self.failed_in_part) {
-                    (_, 0) => format!("{failed} of {total} inputs failed"),
-                    (0, partly) => format!("{partly} of {total} inputs failed in part"),
-                    (_, partly) => {
-                        format!("{failed} of {total} inputs failed (and {partly} in part)")
-                    }
-                };
-                let message = format!("{failures}; the others are done");
-                Err(Failure::new(SOME_INPUTS, message))
+        let failed = FailedInputs {
+            failed: self.failed,
+            in_part: self.failed_in_part,
+        };
+        self.end.map_or_else(|| failed.outcome_of(self.total), Err)
+    }
+}
+
+/// How many inputs failed, as a batch, its shards, `merge` and `check` count them: those without any result, and those
+/// that have results of some of their animations.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) struct FailedInputs {
+    pub(crate) failed: usize,
+    pub(crate) in_part: usize,
+}
+
+impl FailedInputs {
+    /// Counts inputs by the exit codes of commands that have each of them alone.
+    pub(crate) fn of_codes(codes: impl Iterator<Item = Option<u8>>) -> Self {
+        codes.fold(Self::default(), |mut count, code| {
+            match code {
+                Some(SOME_INPUTS) => count.in_part += 1,
+                _ => count.failed += 1,
             }
+            count
+        })
+    }
+
+    /// `2 inputs failed, 1 input failed in part`; nothing where none failed.
+    pub(crate) fn text(self) -> Option<String> {
+        let inputs = |count| words::count(count, "input");
+        match (self.failed, self.in_part) {
+            (0, 0) => None,
+            (failed, 0) => Some(format!("{} failed", inputs(failed))),
+            (0, in_part) => Some(format!("{} failed in part", inputs(in_part))),
+            (failed, in_part) => Some(format!(
+                "{} failed, {} failed in part",
+                inputs(failed),
+                inputs(in_part)
+            )),
         }
+    }
+
+    /// The outcome of a command with that many inputs.
+    pub(crate) fn outcome_of(self, total: usize) -> Result<(), Failure> {
+        let failures = match (self.failed, self.in_part) {
+            (0, 0) => return Ok(()),
+            (failed, _) if failed == total => {
+                let message = match total {
+                    1 => "the input failed".to_owned(),
+                    _ => format!("all {failed} inputs failed"),
+                };
+                return Err(Failure::new(ALL_INPUTS, message));
+            }
+            (failed, 0) => format!("{failed} of {total} inputs failed"),
+            (0, in_part) => format!("{in_part} of {total} inputs failed in part"),
+            (failed, in_part) => {
+                format!("{failed} of {total} inputs failed (and {in_part} in part)")
+            }
+        };
+        let message = format!("{failures}; the others are done");
+        Err(Failure::new(SOME_INPUTS, message))
     }
 }
 

@@ -1,7 +1,9 @@
 //! Listings and JSON, on standard output.
 
 use std::io::{self, Write};
+use std::sync::atomic::{AtomicBool, Ordering};
 
+use tumble_formats::Code;
 use tumble_formats::printable::{printable, printable_lines};
 
 use crate::batch::entry::InputEntry;
@@ -24,8 +26,12 @@ pub(crate) fn styled(text: &str) -> Result<(), Failure> {
     }
 }
 
+/// Whether JSON was printed, or begun.
+static HAS_JSON: AtomicBool = AtomicBool::new(false);
+
 /// As [`text`], for programs: pretty-printed JSON.
 pub(crate) fn json(value: &impl serde::Serialize) -> Result<(), Failure> {
+    HAS_JSON.store(true, Ordering::Relaxed);
     let text =
         serde_json::to_string_pretty(value).expect("names are strings and numbers are numbers");
     styled(&format!("{}\n", json_printable(&text)))
@@ -40,6 +46,44 @@ pub(crate) fn records(
     let results = results.iter().map(serde_json::to_value);
     let records: Result<Vec<_>, _> = results.chain(failed).collect();
     json(&records.expect("names are strings and numbers are numbers"))
+}
+
+/// Prepares for a command's JSON.
+pub(crate) fn begin() {
+    HAS_JSON.store(false, Ordering::Relaxed);
+}
+
+/// What a command prints with `--json`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum JsonForm {
+    Object,
+    /// A list of records.
+    List,
+}
+
+/// The failure of a command, in the form of its JSON, if it ended before that was printed.
+pub(crate) fn failed(failure: &Failure, form: JsonForm) -> Result<(), Failure> {
+    #[derive(serde::Serialize)]
+    struct FailedCommand<'a> {
+        state: &'static str,
+        code: u8,
+        message: &'a str,
+        /// The code of the error in an input, such as E021.
+        diagnostic: Option<&'static str>,
+    }
+    if HAS_JSON.load(Ordering::Relaxed) || failure.message().is_empty() {
+        return Ok(());
+    }
+    let failed = FailedCommand {
+        state: "failed",
+        code: failure.code,
+        message: failure.message(),
+        diagnostic: failure.input_code().map(Code::name),
+    };
+    match form {
+        JsonForm::Object => json(&failed),
+        JsonForm::List => json(&[failed]),
+    }
 }
 
 /// JSON with escapes for all characters that a terminal would obey: outside ASCII they stand in strings

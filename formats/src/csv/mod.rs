@@ -1,6 +1,7 @@
 //! CSV with a line for each frame: `frame,time,<track>.w,<track>.x,<track>.y,<track>.z,…`. The column `w` comes last
 //! in the order x y z w. Other encodings have their numbers as columns.
 
+mod capture;
 mod motion;
 pub mod read;
 

@@ -7,6 +7,7 @@ use std::path::Path;
 use ::csv::{ByteRecord, Reader, ReaderBuilder};
 
 use crate::budget::Budget;
+use crate::csv::capture::{CaptureHeading, has_no_number};
 use crate::decimal::Decimal;
 use crate::diagnostic::{Code, Diagnostic, Location};
 use crate::dialect;
@@ -59,10 +60,23 @@ pub fn read_csv(name: &str, bytes: Vec<u8>, options: &ReadOptions) -> Result<Loa
         let message = "the file is empty; its first line names the columns";
         return Err(Diagnostic::new(name, Code::Empty, message));
     }
-    let names = header
-        .iter()
-        .map(|cell| cell_text(String::from_utf8_lossy(cell).trim()).to_owned());
-    let names: Vec<String> = names.collect();
+    let next = || {
+        let mut row = ByteRecord::new();
+        Ok(sheet.next(&mut reader, &mut row)?.then_some(row))
+    };
+    let capture = CaptureHeading::read(name, &header, next)?;
+    let names: Vec<String> = match &capture {
+        Some(capture) => capture.names.clone(),
+        None => header
+            .iter()
+            .map(|cell| cell_text(String::from_utf8_lossy(cell).trim()).to_owned())
+            .collect(),
+    };
+    let stated = ReadOptions {
+        source_rate: (options.source_rate).or(capture.as_ref().and_then(|it| it.rate)),
+        ..options.clone()
+    };
+    let options = &stated;
     let mut plan = TablePlan::of(name, &names, options)
         .map_err(|refusal| sheet.with_names_below(&mut reader, refusal))?;
     let mut columns = Vec::with_capacity(plan.columns.len());
@@ -99,6 +113,18 @@ pub fn read_csv(name: &str, bytes: Vec<u8>, options: &ReadOptions) -> Result<Loa
     let mut starts = Vec::new();
     let budget = Budget::of(bytes.len(), options.limits);
     while sheet.next(&mut reader, &mut record)? {
+        // Another table may follow in the same file.
+        if capture.is_some() && has_no_number(&record) {
+            if record.iter().any(|cell| !cell.trim_ascii().is_empty()) {
+                let location = sheet.cell(&record, 0);
+                warnings.warn(Code::ColumnsLeftOut, || {
+                    let message = "another table begins here; only the first of the file is read";
+                    (Some(location), message)
+                });
+                break;
+            }
+            continue;
+        }
         sheet.check_width(&record, &names)?;
         // A number of a column or a row's location.
         let charged = budget.take(columns.len() + 1, size_of::<f64>());
@@ -139,6 +165,7 @@ pub fn read_csv(name: &str, bytes: Vec<u8>, options: &ReadOptions) -> Result<Loa
         })),
     };
     let mut loaded = clips(&table, &plan, options)?;
+    loaded.space = loaded.space.or(capture.map(|capture| capture.space));
     let mut all = warnings.into_list();
     all.append(&mut loaded.warnings);
     loaded.warnings = all;
@@ -250,6 +277,14 @@ impl<'a> Sheet<'a> {
                 continue;
             }
             let location = self.cell(&record, 0);
+            let mut after = ByteRecord::new();
+            let has_units =
+                matches!(self.next(reader, &mut after), Ok(true)) && has_no_number(&after);
+            let units = if has_units {
+                ", and the one of units after it,"
+            } else {
+                ""
+            };
             let remedy = match (time, frame) {
                 (Some(time), _) => format!("--map 'time={time}'"),
                 (None, frame) => format!(
@@ -263,8 +298,8 @@ impl<'a> Sheet<'a> {
                 .map(|cell| format!("`{cell}`"))
                 .collect();
             refusal.message = format!(
-                "the names of the columns are in this line ({}, …), below others, as Motive and Vicon write tables: \
-                 delete the lines before it, and one of units after it, and give {remedy}",
+                "the names of the columns are in this line ({}, …), below others: delete the lines before it{units} \
+                 and give {remedy}",
                 shown.join(", ")
             );
             refusal.location = Some(location);

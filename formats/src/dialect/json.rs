@@ -290,7 +290,7 @@ fn episode(
     if !unnamed.is_empty() {
         warnings.warn(Code::UnnamedJoints, || {
             let message = format!(
-                "the file does not name the joints of {}",
+                "the file does not name the joints of {}; --robot FILE gives them the names of the robot's joints",
                 unnamed.join(", ")
             );
             (None, message)

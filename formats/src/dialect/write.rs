@@ -86,6 +86,10 @@ pub fn written_joints(tree: &Tree, bodies: &[usize]) -> Vec<usize> {
     joints_of(tree, bodies)
 }
 
+/// For motions that no dialect can hold.
+const OTHER_FILES: &str =
+    "leave out --dialect (in Python `dialect`) and write NPZ, CSV or GLB, which have room for it";
+
 impl WrittenDialect {
     /// The dialect of this name; case is ignored.
     #[must_use]
@@ -116,22 +120,24 @@ impl WrittenDialect {
         let rate = motion.rate;
         if self.has_whole_rate && rate.per_second().fract() != 0.0 {
             let message = format!(
-                "{} stores a whole number of frames a second, and the rate is {rate}; give --fps",
-                self.name
+                "{} stores a whole number of frames a second, and the rate is {rate}; give --fps {} (with `tumble \
+                 eval`)",
+                self.name,
+                rate.per_second().round().max(1.0)
             );
             return Err(refuse(message).into());
         }
         let counts = motion.tree.counts();
         if counts.balls > 0 {
             let message = format!(
-                "the robot has {} balls, and {} has one number for each joint",
+                "the robot has {} balls, and {} has one number for each joint; {OTHER_FILES}",
                 counts.balls, self.name
             );
             return Err(refuse(message).into());
         }
         if counts.free > 1 {
             let message = format!(
-                "the robot has {} free joints, and {} has one root",
+                "the robot has {} free joints, and {} has one root; {OTHER_FILES}",
                 counts.free, self.name
             );
             return Err(refuse(message).into());

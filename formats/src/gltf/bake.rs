@@ -215,7 +215,7 @@ impl<'a> AnimationBaker<'a> {
             Some(pair) => {
                 let [one, next] = [pair[0], pair[1]];
                 let message =
-                    format!("f32 has no time between {one} and {next}; sample at a lower rate");
+                    format!("f32 has no time between {one} and {next}; give a lower rate (--fps)");
                 Err(self.json.refuse(&self.pointer, Code::TimesInF32, message))
             }
         }

@@ -315,14 +315,16 @@ pub(super) fn f32_times(tracks: usize, seconds: &[f64]) -> Result<Vec<f32>, (Cod
     }
     if !last.is_finite() {
         let time = seconds[seconds.len() - 1];
-        let why = format!("{time} s is beyond f32, in which glTF has times; sample it earlier");
+        let why = format!(
+            "{time} s is beyond f32, in which glTF has times; --end SECONDS ends it before"
+        );
         return Err((Code::TimesInF32, why));
     }
     if let Some(index) = times.windows(2).position(|pair| pair[0] >= pair[1]) {
         let spacing = f64::from(last.next_up()) - f64::from(last);
         let why = format!(
-            "{} s and {} s are one time in f32, in which glTF has times; there f32 has a \
-             time every {spacing} s: sample at {} fps or less, or nearer to 0 s",
+            "{} s and {} s are one time in f32, in which glTF has times; there f32 has a time every {spacing} s: give \
+             --fps {} or less",
             seconds[index],
             seconds[index + 1],
             1.0 / spacing,

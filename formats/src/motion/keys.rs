@@ -121,7 +121,8 @@ impl Origin<'_> {
                 match self.duplicates {
                     Duplicates::Refuse => {
                         let message = format!(
-                            "two different keys at time {time}; --duplicates first or last keeps one key, both keeps a jump"
+                            "two different keys at time {time}; --duplicates first or --duplicates last keeps one of \
+                             them, --duplicates both makes a jump"
                         );
                         return Err(self.refuse(key, Code::EqualTimes, message));
                     }

@@ -88,7 +88,7 @@ fn times_that_f32_cannot_tell_apart_are_refused() {
     let words = [
         "86400.00416666667 s and 86400.00833",
         "0.0078125 s",
-        "128 fps or less",
+        "--fps 128 or less",
     ];
     assert_refused(&[at(240.0).sampled()], Code::TimesInF32, &words);
     let (json, _) = glb(&written(&[at(120.0).sampled()], "glb"));

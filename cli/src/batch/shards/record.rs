@@ -282,6 +282,7 @@ mod tests {
             tumble: String::new(),
             device: String::new(),
             one_of: None,
+            frames: entry::FrameNotes::default(),
             warnings: Vec::new(),
         };
         let entries = [entry("a"), entry("b"), entry("c")];

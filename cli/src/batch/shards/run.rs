@@ -188,9 +188,10 @@ impl ResultRecorder for &mut Shard<'_> {
     }
 
     fn skip(&mut self, output: &str) {
-        self.skipped += 1;
+        let made = self.entries.len();
         let there = self.previous.results_of(output);
         self.entries.extend(there.cloned());
+        self.skipped += self.entries.len() - made;
     }
 
     fn refuse(&mut self, entry: InputEntry) -> Result<(), Failure> {

@@ -17,7 +17,7 @@ use tumble_formats::compare::{
 use tumble_formats::motion::{Motion, ScalarKind};
 use tumble_formats::npz::open_numbers;
 use tumble_formats::trajectory::{Align, Associate, Step};
-use tumble_formats::{Code, Diagnostic, Format};
+use tumble_formats::{Diagnostic, Format};
 
 use crate::arguments::input::{self, Inputs};
 use crate::arguments::output::one_of;
@@ -72,7 +72,7 @@ pub(crate) struct Arguments {
     /// other than rotations, the largest difference of two numbers
     #[arg(long, value_name = "ANGLE", value_parser = degrees, allow_hyphen_values = true)]
     tolerance: Option<f64>,
-    /// The largest distance: between two translations that pass
+    /// The largest distance: that two translations may be apart
     #[arg(long, value_name = "LENGTH", value_parser = not_negative, allow_hyphen_values = true)]
     distance: Option<f64>,
     /// Align the second trajectory to the first by least squares, by these transformations
@@ -95,7 +95,7 @@ pub(crate) struct Arguments {
     /// Print JSON
     #[arg(long)]
     json: bool,
-    /// Print a table of the joints as CSV
+    /// Print a table of the joints and the scalars as CSV
     #[arg(long, conflicts_with = "json")]
     csv: bool,
 }
@@ -174,23 +174,6 @@ enum ComparisonReport {
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let outcome = compare(arguments);
-    // Differences over their bounds have been printed.
-    if let Err(failure) = &outcome
-        && arguments.json
-        && failure.code != DIFFERENCE
-    {
-        listing::json(&serde_json::json!({
-            "state": "failed",
-            "code": failure.code,
-            "message": failure.message(),
-            "diagnostic": failure.input_code().map(Code::name),
-        }))?;
-    }
-    outcome
-}
-
-fn compare(arguments: &Arguments) -> Result<(), Failure> {
     let inputs = arguments.inputs.with_repeats()?;
     let [first, second] = &inputs[..] else {
         return Err(Failure::usage(format!(
@@ -246,6 +229,7 @@ impl Arguments {
                 let ordered = found.iter().map(|found| {
                     let mut found = found.clone();
                     found.joints = table.listed(&found.joints);
+                    found.each_scalar = table.listed_scalars(&found.each_scalar);
                     found
                 });
                 if self.csv {

@@ -3,7 +3,9 @@
 use std::io;
 
 use clap::{Args, ValueEnum};
-use tumble_formats::compare::{ClipDifference, JointDifference, TimedSpread};
+use tumble_formats::compare::{
+    ClipDifference, JointDifference, ScalarDifference, Spread, TimedSpread,
+};
 use tumble_formats::printable::printable;
 
 use crate::messages::words;
@@ -44,6 +46,15 @@ impl TableArguments {
         let mut joints = self.ordered(joints);
         joints.truncate(self.top.unwrap_or(joints.len()));
         joints
+    }
+
+    /// The scalars of a comparison, worst first, as many as `--top` says.
+    pub(super) fn listed_scalars(self, scalars: &[ScalarDifference]) -> Vec<ScalarDifference> {
+        let mut scalars = scalars.to_vec();
+        let largest = |scalar: &ScalarDifference| scalar.difference.spread.largest;
+        scalars.sort_by(|a, b| largest(b).total_cmp(&largest(a)));
+        scalars.truncate(self.top.unwrap_or(scalars.len()));
+        scalars
     }
 
     /// All joints of a comparison, worst first.
@@ -144,8 +155,11 @@ fn cells(found: &TimedSpread, unit: &str) -> [String; 3] {
     [mean, largest, at]
 }
 
-/// The joints of all pairs of clips as CSV: angles in degrees, times in seconds, frames of the first clip.
+/// The joints of all pairs of clips as CSV, then their scalars: angles in degrees, times in seconds, frames of the first
+/// clip. A scalar has its name in the column of joints, and its kind.
 pub(super) fn csv_table(differences: &[ClipDifference]) -> io::Result<String> {
+    /// Columns of a quantity.
+    const NUMBERS: usize = 5;
     let mut writer = csv::Writer::from_writer(Vec::new());
     let columns = |name: &str| {
         ["mean", "rms", "largest", "time", "frame"].map(|column| format!("{name}_{column}"))
@@ -156,26 +170,40 @@ pub(super) fn csv_table(differences: &[ClipDifference]) -> io::Result<String> {
             .iter()
             .flat_map(|it| columns(it)),
     );
+    header.push("scalar_kind".to_owned());
+    header.extend(columns("scalar"));
     writer.write_record(&header)?;
+    let numbers = |spread: &Spread, time: f64, frame: Option<f64>| {
+        let of_spread = [spread.mean, spread.rms, spread.largest, time].map(Some);
+        let all = of_spread.into_iter().chain([frame]);
+        all.map(|number| number.map_or_else(String::new, |it| it.to_string()))
+            .collect::<Vec<String>>()
+    };
+    let blank = |count: usize| std::iter::repeat_n(String::new(), count);
     for difference in differences {
         for joint in &difference.joints {
             let mut record: Vec<String> = difference.inputs.to_vec();
             record.push(joint.track.clone());
             for found in [Some(joint.rotation), joint.translation, joint.scale] {
-                let numbers = found.map(|found| {
-                    let [mean, rms, largest] =
-                        [found.spread.mean, found.spread.rms, found.spread.largest];
-                    [
-                        Some(mean),
-                        Some(rms),
-                        Some(largest),
-                        Some(found.time),
-                        found.frame,
-                    ]
-                });
-                let cells = numbers.unwrap_or_default();
-                record.extend(cells.map(|it| it.map_or_else(String::new, |it| it.to_string())));
+                match found {
+                    Some(found) => record.extend(numbers(&found.spread, found.time, found.frame)),
+                    None => record.extend(blank(NUMBERS)),
+                }
             }
+            record.extend(blank(1 + NUMBERS));
+            writer.write_record(&record)?;
+        }
+        for ScalarDifference {
+            kind,
+            difference: found,
+            ..
+        } in &difference.each_scalar
+        {
+            let mut record: Vec<String> = difference.inputs.to_vec();
+            record.push(found.track.clone());
+            record.extend(blank(3 * NUMBERS));
+            record.push((*kind).to_owned());
+            record.extend(numbers(&found.spread, found.time, found.frame));
             writer.write_record(&record)?;
         }
     }

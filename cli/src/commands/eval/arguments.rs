@@ -201,7 +201,7 @@ impl Arguments {
     /// Refuses options that have no effect on the layout of another program.
     fn check_dialect(&self, dialect: &WrittenDialect) -> Result<(), Failure> {
         let options = [
-            ("output", "--quantity"),
+            ("quantity", "--quantity"),
             ("tracks", "--tracks"),
             ("max_gap", "--max-gap"),
             ("times", "--times"),

@@ -13,7 +13,7 @@ use tumble_formats::motion::{Joint, Motion, SampledClip, Transform};
 use tumble_formats::origin::origin_of;
 use tumble_formats::poses::{Poses, SCALAR, TRANSFORM, WORLD};
 use tumble_formats::quaternion::ComponentOrder;
-use tumble_formats::sample::Samples;
+use tumble_formats::sample::{MethodChoice, Samples};
 use tumble_formats::world::{HierarchyError, world};
 use tumble_formats::{Code, Diagnostic};
 
@@ -24,6 +24,7 @@ use crate::arguments::output::PoseKind;
 use crate::arguments::results::document_to_rewrite;
 use crate::arguments::robot::{RobotFrames, RobotReport, or_engine_error};
 use crate::arguments::time::{ClipFrames, SampleChoice};
+use crate::batch::entry::FrameNotes;
 use crate::batch::pipeline::{ClipWork, EvaluatedResult, Pipeline};
 use crate::batch::room;
 use crate::batch::target::{ResultTarget, WrittenFile};
@@ -50,19 +51,15 @@ pub(crate) struct EvaluationReport {
     /// Times between keys that are too far apart, which were left out or held; nothing without `--max-gap`.
     #[serde(skip_serializing_if = "Option::is_none")]
     in_gaps: Option<usize>,
-    /// The frames a second, where they were assumed, because the keys have no rate.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    assumed_fps: Option<String>,
-    /// The seconds from the last frame to the end of the clip, where nothing follows the last frame.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    left_out_seconds: Option<f64>,
-    /// The output that was written for each rotation, as `--quantity` names it.
-    #[serde(rename = "what")]
-    output_kind: &'static str,
+    #[serde(flatten)]
+    notes: FrameNotes,
+    /// The numbers that were written for each rotation, as `--quantity` names them.
+    quantity: &'static str,
     /// The order of a quaternion's components as written; null where none are written, or where the
     /// format fixes the order.
     order: Option<&'static str>,
-    method: String,
+    /// As `--method` names it.
+    method: &'static str,
     device: String,
     /// The report of a robot's motion in the layout of another program; absent for other results.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -314,24 +311,44 @@ impl EvaluationJob<'_> {
         CurveChoice::of_rotations(method, options).of(self.arguments.output.quantity())
     }
 
-    /// The result of this work, and the report about it.
+    /// The result of this work, and the report about it. The message says which method the channels state, if it is one.
     fn evaluated(
         &self,
         (tracks, frames, span): (usize, usize, Option<(f64, f64)>),
-        method: &str,
         written: WrittenFile,
         order: Option<ComponentOrder>,
     ) -> (EvaluatedResult, EvaluationReport) {
+        let methods = self.curve().channel_methods();
+        let mut of_clips = self
+            .work
+            .clips()
+            .into_iter()
+            .map(|clip| methods.method_of(clip));
+        let first = of_clips.next().flatten();
+        let stated = first.filter(|_| {
+            self.arguments.method == MethodChoice::AUTHORED && of_clips.all(|other| other == first)
+        });
+        let stated = stated.map_or(String::new(), |method| format!(" ({method})"));
         let counted = words::count(tracks, "track");
-        self.evaluated_as(&counted, (tracks, frames, span), method, written, order)
+        self.reported(&counted, &stated, (tracks, frames, span), written, order)
     }
 
-    /// As [`Self::evaluated`], with another noun for the samples in the message.
+    /// As [`Self::evaluated`], with another noun for the samples in the message; they are no rotations.
     fn evaluated_as(
         &self,
         counted: &str,
+        extent: (usize, usize, Option<(f64, f64)>),
+        written: WrittenFile,
+        order: Option<ComponentOrder>,
+    ) -> (EvaluatedResult, EvaluationReport) {
+        self.reported(counted, "", extent, written, order)
+    }
+
+    fn reported(
+        &self,
+        counted: &str,
+        stated: &str,
         (tracks, frames, span): (usize, usize, Option<(f64, f64)>),
-        method: &str,
         written: WrittenFile,
         order: Option<ComponentOrder>,
     ) -> (EvaluatedResult, EvaluationReport) {
@@ -353,8 +370,9 @@ impl EvaluationJob<'_> {
             format!(" ({rate} fps, because its keys have no rate)")
         });
         let done = format!(
-            "{counted} × {}{assumed}{in_gaps}{left_out}, {method}",
+            "{counted} × {}{assumed}{in_gaps}{left_out}, {}{stated}",
             words::count(frames, "frame"),
+            self.arguments.method,
         );
         let report = EvaluationReport {
             format: work.target.format().name,
@@ -367,15 +385,18 @@ impl EvaluationJob<'_> {
                 .has("max_gap")
                 .then_some(self.in_gaps),
             last_time: span.map(|span| span.1),
-            assumed_fps,
-            left_out_seconds: self.left_out,
-            output_kind: self.arguments.output.name(),
+            notes: FrameNotes::new(assumed_fps, self.left_out),
+            quantity: self.arguments.output.name(),
             order: order.map(ComponentOrder::name),
-            method: method.to_owned(),
+            method: self.arguments.method.name(),
             device: device.clone(),
             robot: None,
         };
-        (work.result(written, &done, Some(device)), report)
+        let result = EvaluatedResult {
+            frames: report.notes.clone(),
+            ..work.result(written, &done, Some(device))
+        };
+        (result, report)
     }
 }
 
@@ -462,12 +483,11 @@ impl EvaluationJob<'_> {
             notes,
         )?;
         let extent = (report.body_count(), found.times.len(), span(&timeline));
-        let method = self.arguments.method.to_string();
         let counted = report.text();
-        let (result, evaluated) = self.evaluated_as(&counted, extent, &method, written, None);
+        let (result, evaluated) = self.evaluated_as(&counted, extent, written, None);
         let robot = EvaluationReport {
             order: report.quaternion(),
-            output_kind: "robot",
+            quantity: "robot",
             robot: Some(report),
             ..evaluated
         };
@@ -565,7 +585,6 @@ impl EvaluationJob<'_> {
             }
             all.push(found);
         }
-        let method = self.arguments.method.to_string();
         let notes = self.notes(name)?;
         let sampled: Vec<SampledClip<'_>> = (clips.iter().zip(&all).zip(frames))
             .map(|((clip, samples), frames)| samples.of(clip, frames.rate, &notes))
@@ -583,7 +602,7 @@ impl EvaluationJob<'_> {
             .flatten();
         let order = writer.map(|write| self.arguments.order().unwrap_or(write.order));
         let size = (tracks.unwrap_or(0), samples, span);
-        Ok(self.evaluated(size, &method, written, order))
+        Ok(self.evaluated(size, written, order))
     }
 
     /// Refuses to scale a clip that goes nowhere. `boxes`: the result has the length of boxes.
@@ -672,9 +691,7 @@ impl EvaluationJob<'_> {
             self.device
                 .stream(set, &interpolations, frames, result.layout, sink)
         })?;
-        let method =
-            (methods.method_of(clip)).map_or("each channel's method", |method| method.name);
-        Ok(self.evaluated(extent, method, written, order))
+        Ok(self.evaluated(extent, written, order))
     }
 
     /// The scalars of a clip, `[frame][scalar]`, or how fast they change.
@@ -757,10 +774,9 @@ impl EvaluationJob<'_> {
         };
         let write = target.results()?.poses;
         let written = target.prepare(|out| write(&rows, out))?;
-        let method = self.arguments.method.to_string();
         let extent = (count, timeline.len(), span(&timeline));
         let counted = words::count(count, "scalar");
-        Ok(self.evaluated_as(&counted, extent, &method, written, None))
+        Ok(self.evaluated_as(&counted, extent, written, None))
     }
 
     /// Whole poses, `[frame][track]`: along the clip's skeleton, or of the boxes of a chain, each of
@@ -833,8 +849,7 @@ impl EvaluationJob<'_> {
         };
         let write = target.results()?.poses;
         let written = target.prepare(|out| write(&poses, out))?;
-        let method = self.arguments.method.to_string();
-        Ok(self.evaluated(size, &method, written, Some(order)))
+        Ok(self.evaluated(size, written, Some(order)))
     }
 
     /// The clip; one with translations and without a skeleton gets the parents of `--parents`.

@@ -4,6 +4,7 @@ mod arguments;
 pub(crate) mod job;
 pub(crate) mod shards;
 
+use crate::batch::preview::PlannedWork;
 pub(crate) use crate::commands::eval::arguments::Arguments;
 use crate::commands::eval::job::evaluate_all;
 use crate::messages::exit::Failure;
@@ -20,15 +21,18 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let samples = arguments.checked_samples()?;
     let format = arguments.dialect.format(&arguments.results)?;
     arguments.inputs.reading.robot()?;
-    let plan = arguments.results.plan_in(inputs, format)?;
+    arguments.choose_keys();
+    let (reader, options) = (arguments.inputs.clone(), arguments.options(&samples));
+    let work = PlannedWork {
+        reader: &reader,
+        options: &options,
+    };
+    let plan = arguments.results.plan_in(inputs, format, &work)?;
     // All targets have one format.
     if let Some(target) = plan.targets.first() {
         arguments.check_before(target.format())?;
     }
-    arguments.choose_keys();
     let mut device = arguments.device.open()?;
-    let options = arguments.options(&samples);
-    let reader = arguments.inputs.clone();
     let mut pipeline = arguments.results.start(reader, plan, options);
     evaluate_all(arguments, &samples, &mut device, &mut pipeline);
     pipeline.finish()

@@ -16,11 +16,26 @@ use crate::batch::shards::run::Shard;
 use crate::batch::target;
 use crate::commands::eval::arguments::{Arguments, ShardSelection};
 use crate::commands::eval::job::evaluate_all;
-use crate::messages::exit::{ALL_INPUTS, Failure, SOME_INPUTS};
-use crate::messages::{listing, words};
+use crate::messages::exit::{FailedInputs, Failure};
+use crate::messages::listing;
 
 /// Runs the shards of a part.
 pub(crate) fn run(arguments: &Arguments, part: ShardSelection) -> Result<(), Failure> {
+    let mut records = Vec::new();
+    let outcome = run_shards(arguments, part, &mut records);
+    // As long as there are no records, the failure is the only one.
+    if arguments.results.prints_json() && (outcome.is_ok() || !records.is_empty()) {
+        listing::json(&records)?;
+    }
+    outcome
+}
+
+/// As [`run`]; adds the records of results and failures, where they are asked for.
+fn run_shards(
+    arguments: &Arguments,
+    part: ShardSelection,
+    json: &mut Vec<Value>,
+) -> Result<(), Failure> {
     let mut evaluator = Evaluator::new(arguments)?;
     let (folder, resume) = (arguments.results.folder()?, arguments.results.is_resumed());
     let mut gathered = arguments.results.based(arguments.inputs.gather(false)?)?;
@@ -32,8 +47,7 @@ pub(crate) fn run(arguments: &Arguments, part: ShardSelection) -> Result<(), Fai
     let shards = part.shards(plan.cuts.len())?;
     plan.claim(folder, resume, arguments.results.overwrites())?;
     let folder = target::opened(folder)?;
-    let (mut failed, mut inputs) = (0, 0);
-    let mut reports = Vec::new();
+    let (mut codes, mut inputs) = (Vec::new(), 0);
     for number in shards {
         let range = plan.cuts[number - 1].clone();
         inputs += range.len();
@@ -56,25 +70,12 @@ pub(crate) fn run(arguments: &Arguments, part: ShardSelection) -> Result<(), Fai
             .iter()
             .map(|found| found.path.clone());
         let jobs = shard.jobs(paths, &plan.names[range], plan.format);
-        let evaluated = evaluator.evaluate(arguments, jobs, &mut shard)?;
-        reports.extend(evaluated.json.into_iter().flatten());
+        evaluator.evaluate(arguments, jobs, &mut shard, json)?;
         shard.finish()?;
-        failed += shard.header.failed.len();
+        let failed = shard.header.failed.iter();
+        codes.extend(failed.map(|refused| Some(refused.code)));
     }
-    if arguments.results.prints_json() {
-        listing::json(&reports)?;
-    }
-    match failed {
-        0 => Ok(()),
-        _ if failed == inputs => Err(Failure::new(
-            ALL_INPUTS,
-            format!("all {} failed", words::count(failed, "input")),
-        )),
-        _ => {
-            let message = format!("{failed} of {inputs} inputs failed; the others are done");
-            Err(Failure::new(SOME_INPUTS, message))
-        }
-    }
+    FailedInputs::of_codes(codes.into_iter()).outcome_of(inputs)
 }
 
 /// The size of a file; 0 where it cannot be read, which is reported when it is opened.
@@ -126,14 +127,6 @@ impl EvaluationOptions {
     }
 }
 
-/// The outcome of evaluating a shard.
-pub(crate) struct EvaluatedShard {
-    /// How many were evaluated.
-    pub(crate) rotations: u64,
-    /// The records of its results and failures, where they are asked for.
-    json: Option<Vec<Value>>,
-}
-
 /// A request and an open device, kept for shard after shard.
 pub(crate) struct Evaluator {
     pub(crate) request: EvaluationOptions,
@@ -149,13 +142,15 @@ impl Evaluator {
         })
     }
 
-    /// Evaluates the inputs of a shard. Inputs that are refused are in the shard's header, and no failure.
+    /// Evaluates the inputs of a shard; gives the number of rotations. Inputs that are refused are in the shard's header,
+    /// and no failure. Adds the records of results and failures, where they are asked for.
     pub(crate) fn evaluate(
         &mut self,
         arguments: &Arguments,
         jobs: Vec<PipelineJob>,
         shard: &mut Shard<'_>,
-    ) -> Result<EvaluatedShard, Failure> {
+        records_as_json: &mut Vec<Value>,
+    ) -> Result<u64, Failure> {
         arguments.choose_keys();
         let refused = shard.header.failed.len();
         let (inputs, quiet) = (jobs.len(), shard.quiet);
@@ -176,7 +171,7 @@ impl Evaluator {
         let samples = &self.request.samples;
         let rotations = evaluate_all(arguments, samples, &mut self.device, &mut pipeline);
         let (outcome, json) = pipeline.finish_with_json();
-        let evaluated = EvaluatedShard { rotations, json };
+        records_as_json.extend(json.into_iter().flatten());
         match outcome {
             Err(failure) if failure.is_final() => Err(failure),
             Err(failure) => {
@@ -184,9 +179,9 @@ impl Evaluator {
                 if inputs == 1 && shard.header.failed.len() > refused && !quiet {
                     failure.report();
                 }
-                Ok(evaluated)
+                Ok(rotations)
             }
-            Ok(()) => Ok(evaluated),
+            Ok(()) => Ok(rotations),
         }
     }
 }

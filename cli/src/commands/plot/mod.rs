@@ -36,7 +36,7 @@ use crate::commands::plot::subjects::{
     ComponentSelector, PlotQuantity, Subjects, moving_boxes, together,
 };
 use crate::commands::travel::{self, Maker, is_path_file, is_travel};
-use crate::messages::drawn::DrawnFile;
+use crate::messages::drawn::{DrawnFile, note_scalars};
 use crate::messages::exit::{Failure, for_each};
 use crate::messages::progress::Progress;
 use crate::messages::{listing, names, words};
@@ -227,6 +227,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
             return writer.draw(&figure, &file, path).and(rest);
         }
         let input::OnlyClip { clip, rest, .. } = arguments.inputs.load_one(path)?;
+        note_scalars(&name, &clip);
         let tracks = arguments.inputs.tracks.of(&clip, &name)?;
         let choices = arguments.choices(&name, &clip)?;
         note_curves(&name, &clip, &choices);

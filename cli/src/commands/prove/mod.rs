@@ -60,7 +60,7 @@ pub(crate) struct Arguments {
     /// Run everything again under the Khronos validation layer; any message is a failure
     #[arg(long)]
     validate: bool,
-    /// The report of a lab (tumble lab) with the lanes of runs to use
+    /// Use the lanes that `tumble lab` chose: its report
     #[arg(long, value_name = "FILE")]
     lab: Option<PathBuf>,
     #[command(flatten)]

@@ -24,7 +24,9 @@ use crate::arguments::results::{
     ResultArguments, check_sequence, check_stores_keys, document_to_rewrite, makes_new,
 };
 use crate::arguments::tolerance::{degrees, not_negative};
+use crate::batch::entry::FrameNotes;
 use crate::batch::pipeline::{ClipWork, EvaluatedResult};
+use crate::batch::preview::PlannedWork;
 use crate::batch::room;
 use crate::batch::target::{Destination, ResultTarget, WrittenFile};
 use crate::messages::exit::{ALL_INPUTS, Failure};
@@ -62,7 +64,7 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "LENGTH", default_value = "0", value_parser = not_negative, allow_hyphen_values = true)]
     shell: f64,
     /// How to interpolate: the curve that joins the remaining keys
-    #[arg(id = "curve", short, long = "method", alias = "curve", value_name = "METHOD", default_value_t, value_parser = curve())]
+    #[arg(id = "method", short, long = "method", alias = "curve", value_name = "METHOD", default_value_t, value_parser = curve())]
     method: ReducedCurve,
     /// glTF: store rotations with 16 bits per component instead of f32. The errors are those of the file
     /// as it is read back
@@ -137,7 +139,13 @@ impl LargestError {
 
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let files = arguments.inputs.gather(false)?;
-    let plan = arguments.results.plan(files)?;
+    let options = arguments.command_line.options().of_command("reduce");
+    let reader = arguments.inputs.clone();
+    let work = PlannedWork {
+        reader: &reader,
+        options: &options,
+    };
+    let plan = arguments.results.plan(files, &work)?;
     let plot = match &arguments.plot {
         Some(file) => arguments.results.picture(file, &plan)?,
         None => None,
@@ -154,8 +162,6 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     arguments.check_quantized(format)?;
     let engine =
         Engine::new(Device::Cpu).map_err(|error| Failure::evaluating("the CPU", &error))?;
-    let options = arguments.command_line.options().of_command("reduce");
-    let reader = arguments.inputs.clone();
     let mut pipeline = arguments.results.start(reader, plan, options);
     while let Some(work) = pipeline.next_work() {
         let made = arguments.make(&engine, &work, plot.as_ref());
@@ -246,6 +252,7 @@ impl Arguments {
             written,
             device: engine.device_name().to_owned(),
             message: format!("{} in {spent} → {target}{sizes}", lines.join("; ")),
+            frames: FrameNotes::default(),
         };
         Ok((evaluated, reports))
     }

@@ -25,6 +25,7 @@ use crate::arguments::options::CommandLine;
 use crate::arguments::output::{one_of, sequence};
 use crate::arguments::results::{ResultArguments, check_sequence, document_to_rewrite, makes_new};
 use crate::batch::pipeline::{ClipWork, EvaluatedResult};
+use crate::batch::preview::PlannedWork;
 use crate::batch::room;
 use crate::batch::target::{Destination, ResultTarget, WrittenFile};
 use crate::commands::smooth::picture::SmoothingSubject;
@@ -65,7 +66,7 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "N", default_value_t = 1)]
     passes: u32,
     /// How samples continue beyond the first and the last one
-    #[arg(id = "ends", long = "edges", alias = "ends", value_name = "EDGES", default_value_t, value_parser = edges())]
+    #[arg(long = "edges", alias = "ends", value_name = "EDGES", default_value_t, value_parser = edges())]
     edges: SmoothingEnds,
     /// Frames per second: sample at this rate first [default: the keys are the samples]
     #[arg(long, value_name = "FPS")]
@@ -110,7 +111,13 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         .check()
         .map_err(|error| Failure::usage(error.to_string()))?;
     let files = arguments.inputs.gather(false)?;
-    let plan = arguments.results.plan(files)?;
+    let options = arguments.command_line.options().of_command("smooth");
+    let reader = arguments.inputs.clone();
+    let work = PlannedWork {
+        reader: &reader,
+        options: &options,
+    };
+    let plan = arguments.results.plan(files, &work)?;
     let plot = match &arguments.plot {
         Some(file) => arguments.results.picture(file, &plan)?,
         None => None,
@@ -120,8 +127,6 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         plan.targets.first().map(ResultTarget::format),
     )?;
     let mut device = arguments.device.open()?;
-    let options = arguments.command_line.options().of_command("smooth");
-    let reader = arguments.inputs.clone();
     let mut pipeline = arguments.results.start(reader, plan, options);
     while let Some(work) = pipeline.next_work() {
         let made = arguments.make(&work, &smoothing, &mut device, plot.as_ref());

@@ -31,7 +31,7 @@ use crate::commands::travel::{Scenery, TravelSource, is_path_file};
 use crate::commands::view::ghosts::{FoundGhosts, find_ghosts};
 use crate::commands::view::page::{Page, StoredSet};
 use crate::commands::view::shown::{ResultChoice, ShownClip};
-use crate::messages::drawn::DrawnFile;
+use crate::messages::drawn::{DrawnFile, note_scalars};
 use crate::messages::exit::{Failure, OUTPUT, SOME_INPUTS, for_each};
 use crate::messages::progress::Progress;
 use crate::messages::{listing, names, words};
@@ -142,6 +142,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         for clip in loaded.clips {
             let clip = arguments.select_tracks(clip, path)?;
             let mut one = ShownClip::new(path, clip, loaded.box_length, several);
+            note_scalars(&one.name, &one.clip);
             if one.clip.set.is_empty() {
                 words::note(&format!("{}: nothing moves; it is left out", one.name));
                 continue;

@@ -78,11 +78,13 @@ pub struct ClipDifference {
     /// Differences of the scalars of each kind that both clips have: angles in degrees, lengths in the files' unit,
     /// others as they are.
     pub scalars: Vec<ScalarDifference>,
+    /// The differences of each of these scalars, in the order of their kinds, then of the first clip.
+    pub each_scalar: Vec<ScalarDifference>,
     /// The differences of each track that both clips have, in the order of the first clip.
     pub joints: Vec<JointDifference>,
 }
 
-/// The differences of all scalars of one kind.
+/// The differences of one scalar, or of all scalars of one kind.
 #[derive(Debug, Clone, Serialize)]
 #[non_exhaustive]
 pub struct ScalarDifference {
@@ -388,6 +390,7 @@ impl ClipPair<'_> {
         let joints = joints.collect();
         let lengths = |tallies: &ChannelTallies| of_all(tallies, 1.0);
         let (scalar_pairs, missing_scalars) = self.scalar_pairs();
+        let mut each_scalar = Vec::new();
         let scalars = ScalarKind::ALL.iter().filter_map(|&kind| {
             let of_kind = scalar_pairs
                 .iter()
@@ -411,21 +414,24 @@ impl ClipPair<'_> {
             } else {
                 1.0
             };
-            let TimedSpread {
-                spread,
-                time,
-                frame,
-            } = timed(tallies.all, largest / count, factor);
-            let scalar = of_kind.get(largest % count)?[0];
-            let track = motions[0].set.scalar(scalar)?.name.to_owned();
-            let difference = ChannelDifference {
-                spread,
-                track,
-                time,
-                frame,
+            let named = |index: usize, found: TimedSpread| {
+                let [scalar, _] = *of_kind.get(index)?;
+                Some(ScalarDifference {
+                    kind: kind.name(),
+                    difference: ChannelDifference {
+                        spread: found.spread,
+                        track: motions[0].set.scalar(scalar)?.name.to_owned(),
+                        time: found.time,
+                        frame: found.frame,
+                    },
+                })
             };
-            let kind = kind.name();
-            Some(ScalarDifference { kind, difference })
+            let each = (0..of_kind.len()).filter_map(|index| {
+                let found = of_track(&tallies, index, factor);
+                named(index, found)
+            });
+            each_scalar.extend(each);
+            named(largest % count, timed(tallies.all, largest / count, factor))
         });
         let scalars = scalars.collect();
         Ok(ClipDifference {
@@ -441,6 +447,7 @@ impl ClipPair<'_> {
             scalar_count: scalar_pairs.len(),
             missing_scalars,
             scalars,
+            each_scalar,
             joints,
         })
     }
