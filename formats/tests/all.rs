@@ -39,6 +39,7 @@ mod readme;
 mod reduce;
 mod retarget;
 mod robots;
+mod root_motion;
 mod round_trip;
 mod scalars;
 mod skins;

@@ -55,7 +55,7 @@ Examples:
   tumble plot data/pendulum.dat --components 0.x,3.z -m slerp,c2 -o two.png
   tumble plot data/pendulum.dat --show speed -m slerp,catmull-rom,c2 -o speed.svg
   tumble plot data/pendulum.dat --show error --tracks 3 -m all -o error.svg
-  tumble plot lafan1/walk.csv --show scalars --scalars 'joint_3,joint_9' -o knees.svg
+  tumble plot lafan1/walk.csv --robot g1.xml --show scalars --scalars '*elbow' -o elbows.svg
   tumble plot data/*.dat -o pictures           a picture for each box of each input
   tumble plot road.csv --path-frame minimal,frenet -o road.svg
   tumble plot --report data/pendulum.dat data/pendulum-random.dat -o report")]
