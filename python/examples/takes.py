@@ -16,7 +16,7 @@ import numpy as np
 JOINTS = 29
 FRAMES = 876
 
-LIMB = '<body name="{0}" pos="0 0 -0.1"><joint name="{0}" axis="{1}"/><inertial pos="0 0 -0.05" mass="1"/>'
+LIMB = '<body name="{0}" pos="0 0 -0.1"><joint name="{0}" axis="{1}"/><inertial pos="0 0 -0.05" mass="1" diaginertia="0.01 0.01 0.01"/>'
 AXES = ["1 0 0", "0 1 0", "0 0 1"]
 
 
@@ -30,7 +30,7 @@ def robot() -> str:
         joint += length
     return (
         '<mujoco model="takes"><compiler angle="radian"/><worldbody><body name="pelvis" pos="0 0 0.8">'
-        f'<freejoint name="root"/><inertial pos="0 0 0" mass="9"/>{"".join(limbs)}</body></worldbody></mujoco>'
+        f'<freejoint name="root"/><inertial pos="0 0 0" mass="9" diaginertia="0.1 0.1 0.1"/>{"".join(limbs)}</body></worldbody></mujoco>'
     )
 
 
