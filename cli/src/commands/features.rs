@@ -223,7 +223,9 @@ impl Arguments {
         let request = BodiesRequest {
             frames: SampleTimes::rate(rate),
             rotations: methods.options.with(method),
-            vectors: method.scalar_method(),
+            vectors: clip
+                .numbers_method(&methods)
+                .unwrap_or(method.scalar_method()),
             order: BodyOrder::DepthFirst,
             siblings: Siblings::File,
             velocity_at: VelocityPoint::Origin,
