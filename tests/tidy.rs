@@ -662,7 +662,10 @@ const ALLOWED: [(&str, &str); 9] = [
     ("at_most", "a bound"),
     ("half_turn", "an angle"),
     ("half_turns", "rotations by this angle"),
-    ("in_place", "without a copy, as in Rust's standard library"),
+    (
+        "in_place",
+        "without a copy, as in Rust's standard library; of motion, as animation tools call it",
+    ),
     ("look_at", "of a camera, as in glam and OpenGL"),
     ("most_common", "what statistics call the mode"),
     ("quarter_turn", "an angle"),

@@ -356,6 +356,32 @@ fn surfaces() {
     fuzz_files("surfaces", &targets::surfaces::surfaces, seeds, &words);
 }
 
+/// Robots, each kind with its elements: nothing that a file says about bodies breaks the tree.
+#[test]
+fn robots() {
+    let mjcf = r#"<mujoco model="m"><compiler angle="radian" eulerseq="zyx"/><default><joint axis="0 1 0"/>
+        <default class="c"><joint range="-1 1"/></default></default><worldbody>
+        <body name="a" pos="0 0 1" euler="0.1 0.2 0.3"><freejoint/><inertial pos="0 0 .1" mass="1"/>
+        <frame pos="0 1 0"><body name="b" childclass="c"><joint name="h" ref="0.5" pos="0 0 .1"/>
+        <joint name="s" type="slide"/></body></frame><body><joint type="ball" name="l"/></body></body></worldbody>
+        <equality><joint joint1="h" joint2="s"/></equality>
+        <keyframe><key name="home" qpos="0 0 1 1 0 0 0 0 0 1 0 0 0"/></keyframe></mujoco>"#;
+    let urdf = r#"<robot name="u"><link name="a"/><link name="b"><inertial><origin xyz="0 0 .1"/></inertial></link>
+        <link name="c"/><joint name="h" type="revolute"><parent link="a"/><child link="b"/><origin xyz="0 0 1" rpy="0 1 0"/>
+        <axis xyz="0 1 0"/><limit lower="-1" upper="1"/></joint><joint name="m" type="continuous"><parent link="b"/>
+        <child link="c"/><mimic joint="h" multiplier="2" offset="1"/></joint></robot>"#;
+    for (name, seed) in [("mjcf", mjcf), ("urdf", urdf)] {
+        let corpus = vec![seed.as_bytes().to_vec()];
+        let mut words = words(&corpus);
+        words.extend(
+            seed.split_inclusive('>')
+                .map(|element| element.trim().as_bytes().to_vec()),
+        );
+        let words: Vec<&[u8]> = words.iter().map(Vec::as_slice).collect();
+        fuzz_for(0.3, name, &targets::robots::robot, corpus, &words);
+    }
+}
+
 /// Also headers that nest, and that say they are longer than any file.
 #[test]
 fn paths_and_numbers() {

@@ -705,3 +705,70 @@ fn curves_go_through_their_keys_as_the_file_states() {
         "arcs are no smooth curve"
     );
 }
+
+/// Catches values, names, units or keys of other scalars, and a choice that is not followed.
+#[test]
+fn scalars_are_drawn_with_their_names_units_and_keys() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    fs::write(folder.join("robot.xml"), crate::robots::ROBOT).unwrap();
+    fs::write(folder.join("take.csv"), crate::robots::take()).unwrap();
+    let draw = |more: &str| {
+        let line =
+            format!("plot take.csv --robot robot.xml --show scalars -o out.svg --overwrite {more}");
+        succeed(
+            folder,
+            &line
+                .split(' ')
+                .filter(|word| !word.is_empty())
+                .collect::<Vec<_>>(),
+        );
+        Marks::of(&folder.join("out.svg"))
+    };
+    let all = draw("");
+    for joint in [
+        "left_shoulder",
+        "left_elbow",
+        "right_shoulder",
+        "right_elbow",
+    ] {
+        assert!(all.says(joint), "{joint}");
+    }
+    assert_eq!(
+        all.texts
+            .iter()
+            .filter(|text| *text == "angle, rad")
+            .count(),
+        4
+    );
+    assert_eq!(all.curves(AUTHORED).len(), 4);
+    let elbows = draw("--scalars *_elbow");
+    assert!(elbows.says("right_elbow") && !elbows.says("left_shoulder"));
+    let one = draw("--scalars left_shoulder -m slerp,bessel-overhauser");
+    assert_eq!(
+        (one.curves(SLERP).len(), one.curves(BESSEL_OVERHAUSER).len()),
+        (1, 1)
+    );
+    // The dots lie where the keys are: 31 and the legend's, at 0.3 sin(4 t).
+    let keys: Vec<(f64, f64)> = one.dots[one.dots.len() - 31..].to_vec();
+    let value = |frame: usize| 0.3 * (4.0 * frame as f64 / 30.0).sin();
+    let (top, bottom) = (11, 30);
+    let scale = (keys[top].1 - keys[bottom].1) / (value(top) - value(bottom));
+    for (frame, key) in keys.iter().enumerate() {
+        let y = keys[bottom].1 + scale * (value(frame) - value(bottom));
+        assert!((key.1 - y).abs() < 1.5 * FINER, "{frame}: {} {y}", key.1);
+    }
+    for (line, says) in [
+        (
+            "--show scalars --scalars knee",
+            "--scalars: there is no `knee`; it has 4 scalars",
+        ),
+        ("--show scalars --tracks root", "--tracks"),
+        ("--scalars left_elbow", "add --show scalars"),
+    ] {
+        let line = format!("plot take.csv --robot robot.xml -o out.svg --overwrite {line}");
+        let refused = run(folder, &line.split(' ').collect::<Vec<_>>());
+        assert_eq!(refused.code, 2, "{line}: {}", refused.words);
+        assert!(refused.words.contains(says), "{line}: {}", refused.words);
+    }
+}

@@ -851,3 +851,78 @@ fn scalars_are_compared_one_by_one_and_told_where_they_are_not_drawn() {
         "{both}"
     );
 }
+
+/// Catches root motion that is left in, velocities of joints that change with it, and options without effect.
+#[test]
+fn roots_stay_in_place_or_are_carried() {
+    let folder = folder();
+    let folder = folder.path();
+    let eval = "eval take.csv --robot robot.xml --vertical z";
+    for (rule, out) in [("keep", "kept"), ("in-place", "still")] {
+        let root = match rule {
+            "keep" => "eval take.csv --robot robot.xml".to_owned(),
+            rule => format!("{eval} --root-motion {rule}"),
+        };
+        line(folder, &format!("{root} --fps 50 -o {out}.npz"));
+        line(
+            folder,
+            &format!("{root} --fps 50 --dialect mjlab -o {out}-mjlab.npz"),
+        );
+    }
+    let [kept, still] = ["kept.npz", "still.npz"].map(|file| arrays(&folder.join(file)));
+    let root = |arrays: &HashMap<String, Vec<f64>>| arrays["translations"].clone();
+    assert!(root(&kept).chunks(3).any(|position| position[0] > 0.9));
+    assert!(
+        root(&still)
+            .chunks(3)
+            .all(|position| position[..2] == [0.0, 0.0] && position[2] == 1.0)
+    );
+    // The chest turns about z alone.
+    let rotations = still["rotations"].chunks(4);
+    assert!(
+        rotations
+            .into_iter()
+            .all(|rotation| rotation[..3].iter().all(|part| part.abs() < 1e-7))
+    );
+    let [kept, still] =
+        ["kept-mjlab.npz", "still-mjlab.npz"].map(|file| arrays(&folder.join(file)));
+    for array in ["joint_pos", "joint_vel"] {
+        assert_eq!(kept[array], still[array], "{array}");
+    }
+    let numbers_of_row = 4 * still["body_pos_w"].len() / still["joint_pos"].len();
+    assert!(
+        still["body_pos_w"]
+            .chunks(numbers_of_row)
+            .all(|row| row[..2].iter().all(|part| part.abs() < 1e-6))
+    );
+    line(
+        folder,
+        &format!("{eval} --root-motion extract --fps 50 -o carried.npz"),
+    );
+    let json = String::from_utf8(line(folder, "info carried.npz --json").out).unwrap();
+    assert!(json.contains("root_motion"), "{json}");
+    for (more, says) in [
+        (
+            "--vertical z -o a.npz",
+            "--vertical has no effect on roots that keep their motion",
+        ),
+        (
+            "--root-motion in-place --quantity scalars -o a.csv",
+            "--root-motion is for files of whole clips",
+        ),
+        (
+            "--root-motion extract --dialect mjlab --fps 50 -o a.npz",
+            "which has no joint for it",
+        ),
+        (
+            "--root-motion in-place --root-joint hand -o a.npz",
+            "no joint is called `hand`",
+        ),
+    ] {
+        refused(
+            folder,
+            &format!("eval take.csv --robot robot.xml {more}"),
+            says,
+        );
+    }
+}

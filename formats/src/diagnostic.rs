@@ -312,7 +312,7 @@ codes! {
     RequiredExtension = "W100", "an unknown required extension", "The animations are read without it; data that needs it is refused.";
     CubicOfOne = "W101", "a cubic of one key", "There is nothing to interpolate; the value is constant.";
     EmptySampler = "W102", "a sampler without keys", "Its target is not animated.";
-    NothingMoved = "W103", "an animation that moves no node", "It has no channels, or only those of weights and other properties; it is kept as it is.";
+    NothingMoved = "W103", "an animation that moves no node", "It has no channels, or only those of properties that are not read, such as materials; it is kept as it is.";
     NodeMatrix = "W104", "an animated node with a matrix", "glTF requires translation, rotation and scale for animated nodes. The matrix is decomposed into these.";
     Shear = "W105", "a matrix that shears", "It cannot be decomposed exactly into translation, rotation and scale. An approximation is used, and world poses are refused.";
     NegativeTime = "W106", "a negative time", "glTF has no negative times; players may not show this part.";
@@ -320,7 +320,8 @@ codes! {
     BufferLong = "W108", "a buffer longer than it says", "Bytes after the stated length are not read.";
     TargetPath = "W109", "an unknown target", "The channel animates a property that glTF 2.0 does not define. It is copied unchanged.";
     StaysOutside = "W110" elsewhere, "a file that stays outside", "The file could not be included in the GLB, or the output is in another folder than the input. The URI is kept.";
-    StaysWhole = "W111" elsewhere, "channels that are not cut", "Channels of weights and other properties are copied unchanged, so the animation is as long as these channels.";
+    StaysWhole = "W111" elsewhere, "channels that are not cut", "Channels of properties that are not read, such as materials, are copied unchanged, so the animation is as long as these channels.";
+    NoMorphTargets = "W112", "weights without morph targets", "The channel moves the weights of a node whose mesh has no morph targets, or that has no mesh. It is copied unchanged.";
     BvhMoreRows = "W201", "more rows than frames", "The rows after the last frame are left out.";
     BvhNoFrames = "W202", "no frames", "The skeleton does not move.";
     EndSiteRounded = "W203", "an End Site that f32 rounds", "An End Site is the end of a last bone, relative to its joint. End Sites are stored in f32, with about 7 digits. Offsets of joints and positions keep all digits.";

@@ -77,7 +77,7 @@ pub use crate::format::{Format, Loaded, ReadOptions};
 pub use crate::limits::Limits;
 pub use crate::motion::{
     adjust, carried_mesh, compare, end_frame, keyed, keys, origin, outside, packed, poses, reduce,
-    sample, scalars, signs, skeleton, smooth, trajectory, trim, world,
+    root_motion, sample, scalars, signs, skeleton, smooth, trajectory, trim, world,
 };
 use crate::path::PathFormat;
 pub use crate::source::file_kind;

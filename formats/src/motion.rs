@@ -15,6 +15,7 @@ pub mod packed;
 pub mod poses;
 pub mod recorded;
 pub mod reduce;
+pub mod root_motion;
 pub mod sample;
 pub mod scalars;
 mod select;

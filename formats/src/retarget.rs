@@ -19,7 +19,7 @@ use crate::diagnostic::Diagnostic;
 use crate::format::{Format, Loaded, ReadOptions};
 use crate::gltf;
 use crate::learning::rotation_between;
-use crate::motion::keyed::{KeyedError, keyed};
+use crate::motion::keyed::{KeyedError, keyed_tracks};
 use crate::motion::world::{HierarchyError, parents_first};
 use crate::motion::{Channels, Motion};
 
@@ -247,7 +247,8 @@ pub fn open_target(path: &Path, options: &ReadOptions) -> Result<Loaded, Diagnos
     }
 }
 
-/// Carries the keys of `source` over to the skeleton of `target`; times, rate and names of the clip are the source's.
+/// Carries the keys of `source` over to the skeleton of `target`; times, rate, names and scalars of the clip are the
+/// source's.
 /// Joints of the target without a partner rest.
 ///
 /// # Errors
@@ -259,7 +260,7 @@ pub fn retarget(
 ) -> Result<(Motion, RetargetReport), RetargetError> {
     let mut from = Rig::new(source, "source")?;
     let to = Rig::new(target, "target")?;
-    let samples = keyed(source)?;
+    let samples = keyed_tracks(source)?;
     let joints = from.names.len();
     let local = |sample: usize, joint: usize| {
         let index = sample * joints + joint;
@@ -372,6 +373,7 @@ pub fn retarget(
     if let Some((joint, _)) = pairs.hips {
         motion.set_positions(joint, &samples.times, &hips)?;
     }
+    let mut motion = motion.with_scalars_of(source, 1.0)?;
     if !source.channels.is_empty() {
         let channel = |partner: &Option<usize>| {
             let partner = partner.map_or(Channels::default(), |partner| source.channel(partner));

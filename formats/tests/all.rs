@@ -29,6 +29,7 @@ mod left_out;
 mod maps;
 #[cfg(feature = "mcap")]
 mod mcap;
+mod morphs;
 mod npz;
 mod origins;
 mod pickles;
@@ -38,6 +39,7 @@ mod readme;
 mod reduce;
 mod retarget;
 mod robots;
+mod root_motion;
 mod round_trip;
 mod scalars;
 mod skins;

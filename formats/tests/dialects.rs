@@ -2,7 +2,8 @@
 
 use std::path::PathBuf;
 
-use tumble::glam::Quat;
+use tumble::Channel;
+use tumble::glam::{Quat, Vec3};
 use tumble_formats::motion::{Motion, ScalarKind};
 use tumble_formats::npy::read_numbers;
 use tumble_formats::pickle::Contents;
@@ -63,11 +64,7 @@ fn check(file: &str, clip: &Motion, of: &str) {
         .set
         .vector_keys(tumble::Channel::Translation, 0)
         .unwrap();
-    let found: Vec<f32> = keys
-        .keys
-        .iter()
-        .flat_map(tumble::glam::Vec3::to_array)
-        .collect();
+    let found: Vec<f32> = keys.keys.iter().flat_map(tumble::Vec3::to_array).collect();
     let stored = |name: &str| -> Vec<f32> { expected(name).iter().map(|&n| n as f32).collect() };
     assert_near(file, &found, &stored(&positions));
     let rotation =
@@ -190,7 +187,7 @@ fn positions(clip: &Motion, track: usize) -> Vec<f32> {
     keys.unwrap()
         .keys
         .iter()
-        .flat_map(tumble::glam::Vec3::to_array)
+        .flat_map(tumble::Vec3::to_array)
         .collect()
 }
 
@@ -277,6 +274,86 @@ fn files_of_people_hold_the_stored_numbers() {
             );
         }
     }
+}
+
+/// DeepMimic's 44 numbers: each joint from its columns, w first, at a rate or at the times that durations lead to.
+#[test]
+fn frames_of_deepmimic_are_its_joints() {
+    let read = |durations: [f64; 3], width: usize| {
+        let frame = |(index, duration): (usize, &f64)| {
+            let mut row = vec![0.0; width];
+            row[0] = *duration;
+            row[1..4].copy_from_slice(&[index as f64, 0.9, 0.25]);
+            // A quaternion of its number for each ball, and 1 for w of the others.
+            for (ball, first) in [4, 8, 12, 16, 21, 25, 30, 35, 39].into_iter().enumerate() {
+                let angle = 0.1 * (ball + index) as f64;
+                row[first] = angle.cos();
+                row[first + 1 + ball % 3] = angle.sin();
+            }
+            for (hinge, column) in [20, 29, 34, 43].into_iter().enumerate() {
+                row[column] = hinge as f64 - 0.5 * index as f64;
+            }
+            row
+        };
+        let frames: Vec<Vec<f64>> = durations.iter().enumerate().map(frame).collect();
+        let text = serde_json::json!({"Loop": "wrap", "Frames": frames}).to_string();
+        let format = Format::named("robot-json").unwrap();
+        (format.read_bytes)("walk.txt", text.into_bytes(), &ReadOptions::default())
+    };
+    let loaded = read([0.05; 3], 44).unwrap();
+    let clip = &loaded.clips[0];
+    assert_eq!(
+        (clip.rate.unwrap().per_second(), clip.is_world),
+        (20.0, false)
+    );
+    for (ball, name) in [
+        "root",
+        "chest",
+        "neck",
+        "right_hip",
+        "right_ankle",
+        "right_shoulder",
+        "left_hip",
+        "left_ankle",
+        "left_shoulder",
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let track = clip.set.track(ball);
+        assert_eq!(
+            (track.name, track.times),
+            (Some(name), &[0.0, 0.05, 0.1][..])
+        );
+        for (index, key) in track.keys.iter().enumerate() {
+            let axis = [Vec3::X, Vec3::Y, Vec3::Z][ball % 3];
+            let expected = Quat::from_axis_angle(axis, 0.2 * (ball + index) as f32);
+            assert!(
+                key.dot(expected).abs() > 1.0 - 1e-6,
+                "{name}: {key} {expected}"
+            );
+        }
+    }
+    let root = clip.set.vector_keys(Channel::Translation, 0).unwrap();
+    assert_eq!(root.keys[2], Vec3::new(2.0, 0.9, 0.25));
+    for (hinge, name) in ["right_knee", "right_elbow", "left_knee", "left_elbow"]
+        .into_iter()
+        .enumerate()
+    {
+        let keys = clip.set.scalar(hinge).unwrap();
+        let number = hinge as f32;
+        assert_eq!(
+            (keys.name, keys.keys),
+            (name, &[number, number - 0.5, number - 1.0][..])
+        );
+    }
+    let uneven = read([0.05, 0.25, 9.0], 44).unwrap();
+    let times = uneven.clips[0].set.track(0).times.to_vec();
+    assert!(
+        (times[1] - 0.05).abs() < 1e-12 && (times[2] - 0.3).abs() < 1e-12,
+        "{times:?}"
+    );
+    assert_eq!(read([0.05; 3], 45).unwrap_err().code, Code::Shape);
 }
 
 /// Robots in JSON and in the tables of `LeRobot`, and libraries of clips.

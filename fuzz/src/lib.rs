@@ -16,6 +16,8 @@ pub fn target(name: &str, data: &[u8]) {
         "surfaces" => targets::surfaces::surfaces,
         "paths" => targets::surfaces::paths,
         "numbers" => targets::surfaces::numbers,
+        // The root element says which it is; each has a corpus.
+        "mjcf" | "urdf" => targets::robots::robot,
         _ => panic!("there is no target {name}"),
     };
     target(data);

@@ -23,6 +23,9 @@ use tumble_formats::{Diagnostic, Location};
 #[path = "formats.rs"]
 pub(crate) mod formats;
 
+#[path = "robots.rs"]
+pub(crate) mod robots;
+
 #[path = "surfaces.rs"]
 pub(crate) mod surfaces;
 

@@ -3,8 +3,10 @@
 use glam::{DQuat, DVec3};
 use numpy::{Element, PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
+use pyo3::types::PyTuple;
 use tumble_formats::learning::{
-    self, ContactLimits, Ground, HUMANML3D_JOINTS, HUMANML3D_NUMBERS, SixOrder,
+    self, ContactLimits, Ground, HUMANML3D_JOINTS, HUMANML3D_NUMBERS, HeadingSource, RootMotion,
+    SixOrder,
 };
 
 use crate::arrays::{ArrayValues, ListArgument, Order, doubles, vectors};
@@ -131,6 +133,110 @@ pub(crate) fn heading<'py>(
         Some(axis) => learning::forward_heading(rotation, DVec3::AXES[axis], ground),
     };
     array(quaternions.py(), rotations.iter().map(of).collect(), shape)
+}
+
+/// The heading of a root by an axis of its body, or by its twist.
+pub(crate) fn heading_source(axis: Option<&Bound<'_, PyAny>>) -> PyResult<HeadingSource> {
+    let axes = [HeadingSource::X, HeadingSource::Y, HeadingSource::Z];
+    let axis = axis.map(axis_of).transpose()?;
+    Ok(axis.map_or(HeadingSource::Twist, |axis| axes[axis]))
+}
+
+/// The motion over the ground of a root at `positions` (frames, 3) with `quaternions` (frames, 4), and the rest: its
+/// places on the ground (frames, 3), its headings (frames,), rad, which count whole turns, and the positions and
+/// quaternions of the root in place, above the origin and facing heading 0. All are float64. `up` and `axis` are those of
+/// `heading`.
+///
+/// >>> import tumble
+/// >>> places, headings, positions, quaternions = tumble.features.root_motion(
+/// ...     [[1, 2, 0.9]], [[0.8, 0, 0, 0.6]], order="wxyz", up="z")
+/// >>> places, headings.round(3), positions
+/// (array([[1., 2., 0.]]), array([1.287]), array([[0. , 0. , 0.9]]))
+#[pyfunction]
+#[pyo3(signature = (positions, quaternions, *, order, up, axis=None))]
+pub(crate) fn root_motion<'py>(
+    positions: &Bound<'py, PyAny>,
+    quaternions: &Bound<'py, PyAny>,
+    order: &str,
+    up: &str,
+    axis: Option<&Bound<'py, PyAny>>,
+) -> PyResult<Bound<'py, PyTuple>> {
+    let (ground, source): (Ground, _) = (option_named(up, "up")?, heading_source(axis)?);
+    let order = Order::named(order)?;
+    let (shape, points) = vectors(positions, "positions")?;
+    let (frames, rotations) = rotations(quaternions, order)?;
+    let &[count] = &shape[..] else {
+        let shape = shown(&with(&shape, 3));
+        return Err(input(format!(
+            "positions: its shape is {shape}; give (frames, 3)"
+        )));
+    };
+    if frames != shape {
+        let shape = shown(&with(&frames, 4));
+        return Err(input(format!(
+            "quaternions: its shape is {shape}, not ({count}, 4)"
+        )));
+    }
+    let motion = RootMotion::of(&points, &rotations, ground, source);
+    let (mut still, mut upright) = (Vec::new(), Vec::new());
+    for (frame, (&point, &rotation)) in points.iter().zip(&rotations).enumerate() {
+        let (point, rotation) = motion.in_place(frame, point, rotation);
+        still.extend(point.to_array());
+        upright.extend(order.of_xyzw(rotation.to_array()));
+    }
+    let py = positions.py();
+    let places = motion.positions.iter().flat_map(DVec3::to_array).collect();
+    let all = [
+        array(py, places, vec![count, 3])?,
+        array(py, motion.headings, vec![count])?,
+        array(py, still, vec![count, 3])?,
+        array(py, upright, vec![count, 4])?,
+    ];
+    PyTuple::new(py, all)
+}
+
+/// The places (frames, 3) and headings (frames,) of a root motion after so many whole `loops`, each of which begins where
+/// the last one ended; float64. Negative numbers are loops before. Rounding does not grow with their number.
+///
+/// >>> import tumble
+/// >>> ahead = [[0, 0, 0], [1, 0, 0]]
+/// >>> tumble.features.root_after_loops(ahead, [0, 0], 10, up="z")[0]
+/// array([[10.,  0.,  0.],
+///        [11.,  0.,  0.]])
+#[pyfunction]
+#[pyo3(signature = (positions, headings, loops, *, up))]
+pub(crate) fn root_after_loops<'py>(
+    positions: &Bound<'py, PyAny>,
+    headings: &Bound<'py, PyAny>,
+    loops: i64,
+    up: &str,
+) -> PyResult<Bound<'py, PyTuple>> {
+    let ground: Ground = option_named(up, "up")?;
+    let (shape, points) = vectors(positions, "positions")?;
+    let ArrayValues {
+        shape: frames,
+        values,
+    } = doubles(headings, "headings")?;
+    if shape.len() != 1 || frames != shape {
+        let shapes = [shown(&with(&shape, 3)), shown(&frames)];
+        return Err(input(format!(
+            "positions and headings: their shapes are {} and {}; give (frames, 3) and (frames,)",
+            shapes[0], shapes[1]
+        )));
+    }
+    let motion = RootMotion {
+        ground,
+        positions: points,
+        headings: values,
+    };
+    let motion = motion.after_loops(loops);
+    let py = positions.py();
+    let places = motion.positions.iter().flat_map(DVec3::to_array).collect();
+    let all = [
+        array(py, places, with(&shape, 3))?,
+        array(py, motion.headings, shape)?,
+    ];
+    PyTuple::new(py, all)
 }
 
 /// 0, 1 or 2 for x, y or z.

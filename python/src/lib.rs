@@ -66,7 +66,7 @@ mod _tumble {
     #[pymodule_export]
     use crate::features::{
         contacts, heading, humanml3d, mirror_pairs, mirrored_positions, mirrored_rotations,
-        positions_of_humanml3d, rotations_of_six, six,
+        positions_of_humanml3d, root_after_loops, root_motion, rotations_of_six, six,
     };
     #[pymodule_export]
     use crate::file::file_of_state;

@@ -79,3 +79,62 @@ def test_features_of_humanml3d(shared):
         features.humanml3d(np.zeros((3, 22, 3)))
     with pytest.raises(tumble.InputError, match=r"give \(frames, 22, 3\)"):
         features.humanml3d(np.zeros((3, 21, 3)))
+
+
+def walk(frames=31):
+    """A root that walks a curve and turns, z up."""
+    t = np.linspace(0, 2, frames)
+    positions = np.stack([np.sin(t), t**2, 0.9 + 0.05 * np.sin(9 * t)], -1)
+    turns = Rotation.from_euler("z", 2.5 + 2 * t[:, None]) * Rotation.from_rotvec([0.1, -0.2, 0.0])
+    return positions, turns
+
+
+@pytest.mark.parametrize("axis", [None, "x"])
+def test_root_motion_and_the_rest_are_the_motion(axis):
+    positions, rotations = walk()
+    places, headings, still, upright = features.root_motion(
+        positions, rotations.as_quat(), order="xyzw", up="z", axis=axis
+    )
+    np.testing.assert_array_equal(places, positions * [1, 1, 0])
+    np.testing.assert_allclose(still, positions * [0, 0, 1], atol=1e-15)
+    back = Rotation.from_euler("z", headings[:, None])
+    np.testing.assert_allclose(places + back.apply(still), positions, atol=1e-14)
+    assert (back * Rotation.from_quat(upright) * rotations.inv()).magnitude().max() < 1e-14
+    left = features.heading(upright, order="xyzw", up="z", axis=axis)
+    np.testing.assert_allclose(left, 0, atol=1e-14)
+    assert np.abs(np.diff(headings)).max() < 0.3  # whole turns are counted
+    # Counted loop by loop.
+    step = Rotation.from_euler("z", headings[-1] - headings[0])
+    expected = places
+    for loops in range(1, 6):
+        expected = places[-1] + step.apply(expected - places[0])
+        found, turned = features.root_after_loops(places, headings, loops, up="z")
+        np.testing.assert_allclose(found, expected, atol=1e-12)
+        np.testing.assert_allclose(turned, headings + loops * (headings[-1] - headings[0]), atol=1e-12)
+
+
+def test_root_motion_of_other_shapes_is_refused():
+    positions, rotations = walk()
+    with pytest.raises(tumble.InputError, match=r"quaternions: its shape is \(30, 4\), not \(31, 4\)"):
+        features.root_motion(positions, rotations.as_quat()[:30], order="xyzw", up="z")
+    with pytest.raises(tumble.InputError, match=r"\(31, 3\) and \(30,\)"):
+        features.root_after_loops(positions, np.zeros(30), 2, up="z")
+
+
+def test_clips_stay_in_place_or_are_carried():
+    positions, rotations = walk()
+    times = np.arange(31) / 30
+    clip = tumble.Clip(times, rotations.as_quat(), translations=positions, scalars={"grip": ([0.0], [0.5])})
+    still = clip.root_motion("in-place", up="z")
+    np.testing.assert_allclose(still.translations(0)[1], positions * [0, 0, 1], atol=1e-6)
+    assert still.scalars["grip"][1] == [0.5]
+    carried = clip.root_motion("extract", up="z")
+    assert carried.names[0] == "root_motion"
+    assert carried.parents == [None, 0]
+    np.testing.assert_array_equal(carried.keys(1), still.keys(0))
+    ground, rest = [Rotation.from_quat(carried.keys(track)) for track in (0, 1)]
+    assert (ground * rest * rotations.inv()).magnitude().max() < 6e-7
+    points = carried.translations(0)[1] + ground.apply(carried.translations(1)[1])
+    np.testing.assert_allclose(points, positions, atol=2e-6)
+    with pytest.raises(tumble.InputError, match="no joint is called `head`"):
+        clip.root_motion("in-place", joint="head")

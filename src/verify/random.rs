@@ -11,6 +11,7 @@ use crate::curve::options::{Axes, Ends, KeySigns, Quantity, Speed};
 use crate::engine::Engine;
 use crate::error::Error;
 use crate::method::interpolation::Interpolation;
+use crate::method::vector_method::{ScalarQuantity, VectorMethod};
 use crate::method::{self, METHODS};
 use crate::output::crowd::{CrowdOutput, CrowdValues};
 use crate::output::encoding::Encoding;
@@ -22,7 +23,7 @@ use crate::tracks::set::TrackSet;
 use crate::verify::differences;
 use crate::verify::golden::GoldenError;
 use crate::verify::sets::{
-    SeededRandom, crowd_layer, crowd_library, later, random_set, shared_set,
+    SeededRandom, crowd_layer, crowd_library, later, random_scalars, random_set, shared_set,
 };
 
 /// The result of a round.
@@ -71,6 +72,61 @@ pub fn round(
         3 => crowd_round(device, cpu, &mut random),
         _ => set_round(device, cpu, &mut random),
     }
+}
+
+/// Scalars of a set, and so many samples of each by every method and quantity: 2^20 values and a few.
+const SCALARS: usize = 64;
+const SCALAR_SAMPLES: usize = 781;
+
+/// Compares scalars of a seed by every method, as values, velocities and accelerations: keys at common and at separate
+/// times, with tangents and without, held, repeated, mirrored and extrapolated outside, at rates and at listed times.
+///
+/// ```
+/// use tumble::{Device, Engine, verify::random::scalars_round};
+/// let cpu = Engine::new(Device::Cpu)?;
+/// let found = scalars_round(&cpu, &cpu, 1)?;
+/// assert!(found.values >= 1 << 20 && found.differing == 0);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
+/// # Errors
+/// When the device fails, or refuses a request that the CPU accepts.
+pub fn scalars_round(device: &Engine, cpu: &Engine, seed: u64) -> Result<RandomRound, GoldenError> {
+    let mut random = SeededRandom(seed.rotate_left(32) ^ 0x7363_616c_6172_7321);
+    random.next();
+    let [mut found, mut expected] = [Vec::new(), Vec::new()];
+    for method in VectorMethod::ALL {
+        for quantity in ScalarQuantity::ALL {
+            let set = random_scalars(&mut random, SCALARS);
+            let mut interpolation = Interpolation::from(match method {
+                VectorMethod::C2 => method::C2,
+                VectorMethod::BSpline => method::B_SPLINE,
+                _ => method::SLERP,
+            });
+            interpolation.before = random.pick(&SIDES);
+            interpolation.after = random.pick(&SIDES);
+            if interpolation.method.uses_neighbours {
+                interpolation.ends = random.pick(&[Ends::Natural, Ends::Secant, Ends::Frozen]);
+            }
+            let (start, end) = set.time_span().unwrap_or_default();
+            let (low, high) = (start - 1.0, end + 1.0);
+            let times = (0..SCALAR_SAMPLES).map(|index| match index % 2 {
+                0 => random.between(low, high),
+                _ => low + (high - low) * index as f64 / SCALAR_SAMPLES as f64,
+            });
+            let frames = SampleTimes::at(times.collect());
+            let layout = random.pick(&[Layout::TrackMajor, Layout::FrameMajor]);
+            let evaluate = |engine: &Engine| -> Result<Vec<u8>, Error> {
+                let found =
+                    engine.scalars(&set, quantity, method, interpolation, &frames, layout)?;
+                Ok(bytemuck::cast_slice(found.as_slice()).to_vec())
+            };
+            found.extend(evaluate(device)?);
+            expected.extend(evaluate(cpu)?);
+        }
+    }
+    let description = format!("{SCALARS} scalars by every method and quantity");
+    Ok(compared(description, &found, &expected, size_of::<f32>()))
 }
 
 /// Compares two results of values of `size` bytes each.
@@ -190,13 +246,15 @@ fn set_round(
     })
 }
 
+/// The motions before the first key and after the last.
+const SIDES: [WrapMode; 4] = [
+    WrapMode::Hold,
+    WrapMode::Loop,
+    WrapMode::Mirror,
+    WrapMode::Extrapolate,
+];
+
 fn interpolation(random: &mut SeededRandom) -> Interpolation {
-    let sides = [
-        WrapMode::Hold,
-        WrapMode::Loop,
-        WrapMode::Mirror,
-        WrapMode::Extrapolate,
-    ];
     let is_default = |random: &mut SeededRandom| random.below(3) > 0;
     let mut interpolation = Interpolation::from(random.pick(&METHODS));
     if !is_default(random) {
@@ -206,8 +264,8 @@ fn interpolation(random: &mut SeededRandom) -> Interpolation {
         interpolation.signs = KeySigns::AsAuthored;
     }
     if !is_default(random) {
-        interpolation.before = random.pick(&sides);
-        interpolation.after = random.pick(&sides);
+        interpolation.before = random.pick(&SIDES);
+        interpolation.after = random.pick(&SIDES);
     }
     if random.below(12) == 0 {
         interpolation.speed = Speed::Constant;

@@ -241,6 +241,30 @@ pub(crate) fn scalars_set() -> TrackSet {
     set
 }
 
+/// Scalars of many sizes, some of which share their key times, and some of which have tangents, one key or equal keys.
+pub(crate) fn random_scalars(random: &mut SeededRandom, scalars: usize) -> TrackSet {
+    let mut set = TrackSet::new();
+    let mut times: Vec<f64> = Vec::new();
+    for scalar in 0..scalars {
+        if scalar == 0 || random.below(3) == 0 {
+            let mut time = random.between(-2.0, 2.0);
+            times.clear();
+            for _ in 0..1 + random.below(24) {
+                times.push(time);
+                time += random.pick(&[0.001, 0.02, 0.4, 3.0]) * random.between(0.5, 1.5);
+            }
+        }
+        let size = random.pick(&[0.0, 1e-6, 1.0, 3.0, 1e4]);
+        let mut number = || random.between(-size, size) as f32;
+        let keys: Vec<f32> = times.iter().map(|_| number()).collect();
+        let tangents: Vec<[f32; 2]> = times.iter().map(|_| [number(), number()]).collect();
+        let count = if scalar % 2 == 1 { 0 } else { tangents.len() };
+        set.push_scalar("", &times, &keys, &tangents[..count])
+            .expect("numbers in order");
+    }
+    set
+}
+
 /// Random walks of points, some of which stand still for a time.
 pub(crate) fn paths_set() -> TrackSet {
     let mut random = SeededRandom(14);

@@ -336,6 +336,26 @@ impl CurveChoice {
             .collect())
     }
 
+    /// The methods by which scalars are drawn, each once: a file may state an interpolation for each of them.
+    ///
+    /// # Errors
+    /// When an option has no effect on any of them.
+    pub(crate) fn of_scalars(
+        methods: &[MethodChoice],
+        options: InterpolationArguments,
+        name: &str,
+    ) -> Result<Vec<Self>, Failure> {
+        let used = methods
+            .iter()
+            .map(|method| method.0.unwrap_or(BESSEL_OVERHAUSER));
+        let checked = options.check(&used.collect::<Vec<Method>>());
+        checked.map_err(|message| Failure::usage(format!("{name}: {message}")))?;
+        let choices = each_once(methods.iter()).into_iter();
+        Ok(choices
+            .map(|method| Self::of_rotations(method, options))
+            .collect())
+    }
+
     /// The curve by a method, with the other options.
     pub(crate) fn interpolation(self, method: Method) -> Interpolation {
         self.channel_methods().options.with(method)

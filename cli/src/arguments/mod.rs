@@ -10,6 +10,7 @@ pub(crate) mod path;
 pub(crate) mod reading;
 pub(crate) mod results;
 pub(crate) mod robot;
+pub(crate) mod root_motion;
 pub(crate) mod time;
 pub(crate) mod tolerance;
 pub(crate) mod tracks;

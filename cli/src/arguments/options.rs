@@ -237,6 +237,9 @@ pub(crate) const OPTIONS: &[OptionRule] = &[
     deciding("velocities"),
     deciding("limits"),
     deciding("describe"),
+    of_results("root_motion", root_motion),
+    deciding("heading"),
+    deciding("root_joint"),
     // Other skeletons.
     OptionRule {
         bytes: Bytes::ByContent,
@@ -362,6 +365,14 @@ impl ResultDescription<'_> {
             )
         })
     }
+}
+
+fn root_motion(result: &ResultDescription<'_>) -> Option<String> {
+    let has_poses = result.kind.is_clip() || result.kind == ResultKind::Robot;
+    (!has_poses).then(|| {
+        let name = result.format.name;
+        format!("--root-motion is for files of whole clips, and not for {name} of single numbers; write NPZ, GLB or BVH")
+    })
 }
 
 fn sequence(result: &ResultDescription<'_>) -> Option<String> {

@@ -215,14 +215,9 @@ impl DialectArguments {
         let request = BodiesRequest {
             frames: frames.frames.clone(),
             rotations: methods.options.with(method),
-            vectors: methods.method.0.map_or_else(
-                || {
-                    methods
-                        .vector_method_of(clip)
-                        .unwrap_or(method.scalar_method())
-                },
-                |method| method.scalar_method(),
-            ),
+            vectors: clip
+                .numbers_method(methods)
+                .unwrap_or(method.scalar_method()),
             order: self.body_order.unwrap_or(dialect.order),
             siblings: self.siblings,
             velocity_at: self.velocity_at.unwrap_or(dialect.velocity_at),

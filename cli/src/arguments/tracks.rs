@@ -1,4 +1,4 @@
-//! `--tracks`: some tracks only.
+//! `--tracks` and `--scalars`: some tracks or scalars only.
 
 use std::borrow::Cow;
 use std::str::FromStr;
@@ -83,6 +83,66 @@ impl Selector {
 /// A message names no more tracks than this.
 const MAX_NAMED_TRACKS: usize = 12;
 
+/// The indices that selectors select among names, in the order of the names. `option` and `noun` are those of the message
+/// about a selector that selects none.
+fn indices(
+    selectors: &[Selector],
+    names: &[String],
+    (option, noun): (&str, &str),
+    name: &str,
+) -> Result<Vec<usize>, Failure> {
+    let mut is_selected = vec![false; names.len()];
+    for selector in selectors {
+        let found = selector.of(names);
+        if found.is_empty() {
+            let text = &selector.text;
+            let near = words::nearest(text, names.iter().map(String::as_str));
+            let near = near
+                .map(|near| format!("; did you mean `{near}`?"))
+                .unwrap_or_default();
+            let count = words::count(names.len(), noun);
+            let mut list = names
+                .iter()
+                .take(MAX_NAMED_TRACKS)
+                .cloned()
+                .collect::<Vec<_>>()
+                .join(", ");
+            if names.len() > MAX_NAMED_TRACKS {
+                list += " … (`tumble info --json` names all)";
+            }
+            return Err(Failure::usage(format!(
+                "{name}: {option}: there is no `{text}`{near}; it has {count}, {list}"
+            )));
+        }
+        found
+            .into_iter()
+            .for_each(|index| is_selected[index] = true);
+    }
+    Ok((0..names.len())
+        .filter(|&index| is_selected[index])
+        .collect())
+}
+
+/// The scalars that `--scalars` selects.
+#[derive(Debug, Clone, Default, Args)]
+pub(crate) struct ScalarArguments {
+    /// With --show scalars: only these scalars, by names, patterns ('*knee*'), indices from 0, and ranges of indices
+    #[arg(long = "scalars", value_name = "LIST", value_delimiter = ',')]
+    scalars: Vec<Selector>,
+}
+
+impl ScalarArguments {
+    /// The selected scalars, in the order of the clip; `None` for all.
+    pub(crate) fn of(&self, clip: &Motion, name: &str) -> Result<Option<Vec<usize>>, Failure> {
+        if self.scalars.is_empty() {
+            return Ok(None);
+        }
+        let all = (0..clip.set.scalar_count()).filter_map(|index| clip.set.scalar(index));
+        let names: Vec<String> = all.map(|keys| keys.name.to_owned()).collect();
+        indices(&self.scalars, &names, ("--scalars", "scalar"), name).map(Some)
+    }
+}
+
 impl TrackArguments {
     /// Whether `--tracks` is set.
     pub(crate) fn is_set(&self) -> bool {
@@ -98,38 +158,7 @@ impl TrackArguments {
         let names: Vec<String> = (0..set.track_count())
             .map(|track| set.track_name(track))
             .collect();
-        let mut is_selected = vec![false; names.len()];
-        for selector in &self.tracks {
-            let found = selector.of(&names);
-            if found.is_empty() {
-                let text = &selector.text;
-                let near = words::nearest(text, names.iter().map(String::as_str));
-                let near = near
-                    .map(|near| format!("; did you mean `{near}`?"))
-                    .unwrap_or_default();
-                let count = words::count(names.len(), "track");
-                let mut list = names
-                    .iter()
-                    .take(MAX_NAMED_TRACKS)
-                    .cloned()
-                    .collect::<Vec<_>>()
-                    .join(", ");
-                if names.len() > MAX_NAMED_TRACKS {
-                    list += " … (`tumble info --json` names all)";
-                }
-                return Err(Failure::usage(format!(
-                    "{name}: --tracks: there is no `{text}`{near}; it has {count}, {list}"
-                )));
-            }
-            found
-                .into_iter()
-                .for_each(|track| is_selected[track] = true);
-        }
-        Ok(Some(
-            (0..names.len())
-                .filter(|&track| is_selected[track])
-                .collect(),
-        ))
+        indices(&self.tracks, &names, ("--tracks", "track"), name).map(Some)
     }
 
     /// The clip with the selected tracks alone.

@@ -8,7 +8,7 @@ use tumble::trees::{BodyOrder, Siblings};
 use tumble::{Device, Engine, FrameRate, SampleTimes};
 use tumble_formats::format::Format;
 use tumble_formats::learning::{
-    ContactLimits, FeatureRequest, FeatureSet, Ground, WorldFrames, feature_arrays, write_features,
+    ContactLimits, FeatureRequest, FeatureSet, WorldFrames, feature_arrays, write_features,
 };
 use tumble_formats::motion::Motion;
 use tumble_formats::retarget::{Role, recognise};
@@ -23,6 +23,7 @@ use crate::arguments::interpolation::method_argument;
 use crate::arguments::options::CommandLine;
 use crate::arguments::output::one_of;
 use crate::arguments::results::ResultArguments;
+use crate::arguments::root_motion::VerticalArguments;
 use crate::batch::pipeline::{ClipWork, EvaluatedResult};
 use crate::batch::preview::PlannedWork;
 use crate::messages::exit::{ALL_INPUTS, Failure};
@@ -57,9 +58,8 @@ pub(crate) struct Arguments {
     /// How to interpolate: `authored`, or a method (`tumble methods`)
     #[arg(short, long, value_name = "METHOD", default_value = "authored", value_parser = method_argument())]
     method: MethodChoice,
-    /// The axis that points up, for headings and contacts
-    #[arg(long, value_name = "AXIS", default_value = "y", value_parser = vertical())]
-    vertical: Ground,
+    #[command(flatten)]
+    vertical: VerticalArguments,
     /// The height below which a slow joint touches the ground, metres
     #[arg(long, value_name = "METRES", default_value_t = ContactLimits::PROTOMOTIONS.height)]
     contact_height: f64,
@@ -86,14 +86,6 @@ fn sets() -> impl TypedValueParser<Value = FeatureSet> {
         FeatureSet::Humanml3d => "the 263 numbers of HumanML3D",
     };
     one_of(FeatureSet::ALL.map(|set| (set.name(), help(set), set)))
-}
-
-fn vertical() -> impl TypedValueParser<Value = Ground> {
-    let help = |axis| match axis {
-        Ground::Y => "as in glTF, BVH and HumanML3D",
-        Ground::Z => "as robots have it",
-    };
-    one_of(Ground::ALL.map(|axis| (axis.name(), help(axis), axis)))
 }
 
 fn mirror_axis() -> impl TypedValueParser<Value = usize> {
@@ -180,7 +172,7 @@ impl Arguments {
         };
         let request = FeatureRequest {
             sets: self.sets.clone(),
-            ground: self.vertical,
+            ground: self.vertical.vertical,
             limits: ContactLimits {
                 height: self.contact_height,
                 speed: self.contact_speed,
@@ -236,7 +228,9 @@ impl Arguments {
         let request = BodiesRequest {
             frames: SampleTimes::rate(rate),
             rotations: methods.options.with(method),
-            vectors: method.scalar_method(),
+            vectors: clip
+                .numbers_method(&methods)
+                .unwrap_or(method.scalar_method()),
             order: BodyOrder::DepthFirst,
             siblings: Siblings::File,
             velocity_at: VelocityPoint::Origin,

@@ -50,7 +50,7 @@ pub(crate) fn note_scalars(name: &str, clip: &Motion) {
     if count > 0 {
         let are = if count == 1 { "is" } else { "are" };
         words::note(&format!(
-            "{name}: {} {are} not drawn (`tumble eval --quantity scalars -o FILE.csv` writes them)",
+            "{name}: {} {are} not drawn (`tumble plot --show scalars` draws them)",
             words::count(count, "scalar")
         ));
     }

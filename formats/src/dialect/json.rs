@@ -1,4 +1,5 @@
-//! Motion of robots in JSON: frames of AMP for legged robots, and the episodes of Unitree's `xr_teleoperate`.
+//! Motion of robots in JSON: frames of AMP for legged robots and of DeepMimic's humanoid, and the episodes of Unitree's
+//! `xr_teleoperate`.
 
 use std::path::Path;
 
@@ -13,7 +14,7 @@ use crate::feature::Feature;
 use crate::format::{Format, FormatOption, Loaded, ReadOptions};
 use crate::motion::ScalarKind;
 use crate::npz;
-use crate::npz::plan::{ArchivePlan, KeyKind, RobotArrays};
+use crate::npz::plan::{ArchivePlan, KeyArray, KeyKind, RobotArrays, TimeList};
 use crate::quaternion::ComponentOrder;
 use crate::source::Source;
 use crate::warnings::Warnings;
@@ -21,7 +22,7 @@ use crate::warnings::Warnings;
 /// The format of robots' motion in JSON.
 pub static FORMAT: Format = Format {
     name: "robot-json",
-    summary: "motion of robots in JSON: AMP's frames, episodes of xr_teleoperate",
+    summary: "motion of robots in JSON: frames of AMP and DeepMimic, episodes of xr_teleoperate",
     extensions: &[],
     probe: |start| {
         let has = |word: &[u8]| start.windows(word.len()).any(|window| window == word);
@@ -52,10 +53,11 @@ pub static FORMAT: Format = Format {
 };
 
 /// Names by which such files are known; one is near their beginning.
-const KNOWN: [&str; 4] = [
+const KNOWN: [&str; 5] = [
     "\"Frames\"",
     "\"FrameDuration\"",
     "\"LoopMode\"",
+    "\"Loop\"",
     "\"joint_names\"",
 ];
 
@@ -98,6 +100,13 @@ pub fn read_json(file: &str, bytes: Vec<u8>, options: &ReadOptions) -> Result<Lo
     charged.map_err(|error| Diagnostic::new(file, Code::Memory, error.to_string()))?;
     let value: Map<String, Value> = serde_json::from_slice(&bytes).map_err(refused)?;
     let mut warnings = Warnings::new(file);
+    if let (Some(frames), None, Some(_)) = (
+        value.get("Frames"),
+        value.get("FrameDuration"),
+        value.get("Loop"),
+    ) {
+        return frames_of_deepmimic(file, frames, budget, options, warnings);
+    }
     if let Some(frames) = value.get("Frames") {
         return frames_of_amp(
             file,
@@ -112,7 +121,7 @@ pub fn read_json(file: &str, bytes: Vec<u8>, options: &ReadOptions) -> Result<Lo
             .map_err(|error| Diagnostic::new(file, Code::Json, error.to_string()).inside("info"))?;
         return episode(file, data, &info, budget, options, &mut warnings);
     }
-    let message = "neither AMP's `Frames` nor the `info` and `data` of xr_teleoperate are there";
+    let message = "neither `Frames` of AMP or DeepMimic nor the `info` and `data` of xr_teleoperate are there";
     Err(Diagnostic::new(file, Code::UnknownArrays, message))
 }
 
@@ -205,6 +214,114 @@ fn frames_of_amp(
         &mut warnings,
     )?;
     plan.read_rate(&archive, &["fps"])?;
+    npz::read_plan(&archive, &mut plan, options, warnings)
+}
+
+/// The numbers of a frame of DeepMimic's humanoid: how long it lasts, where the root is, a quaternion for the root and
+/// each ball, and an angle for each hinge.
+const DEEPMIMIC: usize = 44;
+const DEEPMIMIC_ROOT: usize = 1;
+const DEEPMIMIC_ROTATIONS: [(&str, usize); 9] = [
+    ("root", 4),
+    ("chest", 8),
+    ("neck", 12),
+    ("right_hip", 16),
+    ("right_ankle", 21),
+    ("right_shoulder", 25),
+    ("left_hip", 30),
+    ("left_ankle", 35),
+    ("left_shoulder", 39),
+];
+const DEEPMIMIC_HINGES: [(&str, usize); 4] = [
+    ("right_knee", 20),
+    ("right_elbow", 29),
+    ("left_knee", 34),
+    ("left_elbow", 43),
+];
+
+/// The motion of DeepMimic's humanoid: rotations of the root and the balls, each relative to the body before it, y up, and
+/// angles of the knees and elbows.
+fn frames_of_deepmimic(
+    file: &str,
+    frames: &Value,
+    budget: Budget,
+    options: &ReadOptions,
+    mut warnings: Warnings,
+) -> Result<Loaded, Diagnostic> {
+    let (numbers, width) = rows(file, frames)?;
+    if width != DEEPMIMIC {
+        let message = format!(
+            "frames of {width} numbers; those of DeepMimic's humanoid have {DEEPMIMIC}, and those of AMP stand beside \
+             a `FrameDuration`"
+        );
+        return Err(Diagnostic::new(file, Code::Shape, message).inside("Frames"));
+    }
+    let rows = || numbers.chunks_exact(DEEPMIMIC);
+    let count = rows().len();
+    let of_each = |columns: &[(&str, usize)], width: usize| -> Vec<f64> {
+        let parts = rows().flat_map(|row| {
+            let columns = columns.iter();
+            columns.flat_map(move |&(_, first)| &row[first..first + width])
+        });
+        parts.copied().collect()
+    };
+    let durations: Vec<f64> = rows().map(|row| row[0]).collect();
+    let is_even = durations.iter().all(|duration| *duration == durations[0]);
+    let times = durations.iter().scan(0.0, |end, duration| {
+        let start = *end;
+        *end += duration;
+        Some(start)
+    });
+    // The rate, or the times where frames last differently.
+    let clock = match is_even {
+        true => ("fps".to_owned(), Vec::new(), vec![1.0 / durations[0]]),
+        false => ("times".to_owned(), vec![count], times.collect()),
+    };
+    let balls = DEEPMIMIC_ROTATIONS.len();
+    let arrays = [
+        (
+            "rotations".to_owned(),
+            vec![count, balls, 4],
+            of_each(&DEEPMIMIC_ROTATIONS, 4),
+        ),
+        (
+            "root".to_owned(),
+            vec![count, 3],
+            of_each(&[("root", DEEPMIMIC_ROOT)], 3),
+        ),
+        (
+            "hinges".to_owned(),
+            vec![count, DEEPMIMIC_HINGES.len()],
+            of_each(&DEEPMIMIC_HINGES, 1),
+        ),
+        clock,
+    ];
+    let archive = archive_of(file, budget, arrays);
+    let mut plan = ArchivePlan {
+        is_part: true,
+        names: DEEPMIMIC_ROTATIONS.map(|(name, _)| name.to_owned()).into(),
+        ..ArchivePlan::default()
+    };
+    let order = options.source_order.unwrap_or(ComponentOrder::Wxyz);
+    for (name, kind) in [
+        ("rotations", KeyKind::Quaternion(order)),
+        ("root", KeyKind::Translation),
+    ] {
+        if let Some(part) = KeyArray::of(&archive, name, kind, 0, Layout::FrameMajor)? {
+            plan.add(&archive, part)?;
+        }
+    }
+    let columns = (super::member(&archive, "hinges")?, Layout::FrameMajor, 0);
+    let names = DEEPMIMIC_HINGES.map(|(name, _)| name.to_owned()).into();
+    let kind = |_| ScalarKind::Angle;
+    plan.add_scalars(&archive, columns, Some(names), kind, &mut warnings)?;
+    match is_even {
+        true => plan.read_rate(&archive, &["fps"])?,
+        false => {
+            let member = super::member(&archive, "times")?;
+            plan.times = Some(TimeList { member, column: 0 });
+        }
+    }
     npz::read_plan(&archive, &mut plan, options, warnings)
 }
 

@@ -2,6 +2,7 @@
 
 use std::collections::btree_map::{BTreeMap, Entry};
 use std::collections::{BTreeSet, HashMap, HashSet};
+use std::ops::Range;
 
 use serde_json::value::RawValue;
 use tumble::FrameRate;
@@ -9,6 +10,7 @@ use tumble::FrameRate;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::format::ReadOptions;
 use crate::gltf::channel::{ChannelKeys, InputTimes, MovedChannel};
+use crate::gltf::morphs::Morphs;
 use crate::gltf::nodes::Nodes;
 use crate::gltf::reader::GltfReader;
 use crate::gltf::schema::{Animation, AnimationExtras, Channel, Sampler, TargetPath};
@@ -26,7 +28,7 @@ pub(super) struct ReadAnimation {
     pub(super) sampled: Vec<SampledChannel>,
     /// The other channels that move tracks. They change only if the clip is cut.
     pub(super) others: Vec<SampledChannel>,
-    /// Number of channels that move anything else, such as weights.
+    /// Number of channels that move anything else, such as a material.
     pub(super) beside: usize,
 }
 
@@ -36,32 +38,44 @@ pub(super) struct SampledChannel {
     /// Its index among the channels of the animation, and that of its sampler.
     pub(super) channel: usize,
     pub(super) sampler: usize,
-    /// The track and the property that it moves.
+    /// The track and the property that it moves; of weights, the first scalar.
     pub(super) track: usize,
     pub(super) path: TargetPath,
+    /// The number of scalars of weights, 1 for others.
+    pub(super) elements: usize,
+}
+
+impl SampledChannel {
+    /// The scalars of weights.
+    pub(super) fn scalars(&self) -> Range<usize> {
+        self.track..self.track + self.elements
+    }
 }
 
 /// Bytes of memory of a track without its keys: its name, its joint, its channels, and its entries in lists.
 const TRACK: usize = 400;
 
-/// Reads the animation with this index; `None` if it moves no node.
+/// Bytes of memory of a scalar without its keys and its name.
+const SCALAR: usize = 240;
+
+/// Reads the animation with this index; `None` if it moves no node and no morph target.
 ///
 /// # Errors
 /// When the animation is invalid; the first error is returned.
 pub(super) fn read(
     index: usize,
     reader: &GltfReader<'_>,
-    nodes: &Nodes,
+    (nodes, morphs): (&Nodes, &Morphs),
     options: &ReadOptions,
 ) -> Result<Option<(Motion, ReadAnimation)>, Diagnostic> {
     let pointer = format!("/animations/{index}");
     let animation: Animation<'_> = reader.json.entry("animations", index, &pointer)?;
-    let moved = moved(reader, nodes, &animation, &pointer)?;
+    let moved = moved(reader, (nodes, morphs), &animation, &pointer)?;
     if moved.is_empty() {
         reader.warn(
             Code::NothingMoved,
             &pointer,
-            || "the animation moves no node; it is copied unchanged",
+            || "the animation moves no node and no morph target; it is copied unchanged",
         );
         return Ok(None);
     }
@@ -139,6 +153,23 @@ pub(super) fn read(
     for (track, origin) in origins.into_iter().enumerate() {
         motion.set_origin(track, origin);
     }
+    let mut first_scalars = HashMap::new();
+    for (moved, keys) in moved.iter().zip(&keys) {
+        if moved.path != TargetPath::Weights || keys.times.is_empty() {
+            continue;
+        }
+        first_scalars.insert(moved.channel, motion.set.scalar_count());
+        let name = |target| morphs.name(nodes, moved.node, target);
+        let bytes = (0..moved.elements).map(|target| SCALAR + name(target).len());
+        reader.take(bytes.sum(), 1, &pointer)?;
+        let how = (moved.elements, moved.interpolation);
+        let pushed = keys.push_weights(&mut motion, how, name);
+        pushed.map_err(|error| {
+            reader
+                .json
+                .refuse(&moved.output, Code::NotFinite, error.to_string())
+        })?;
+    }
     // Joints that another program has placed since are where it says.
     if motion.has_unplaced_joints() && motion.no_world.is_none() {
         motion.no_world = animation.extras.and_then(no_world);
@@ -149,8 +180,12 @@ pub(super) fn read(
     let channel = |(moved, _): (&MovedChannel, _)| SampledChannel {
         channel: moved.channel,
         sampler: moved.sampler_index,
-        track: tracks.of_node(moved.node),
+        track: match moved.path {
+            TargetPath::Weights => first_scalars.get(&moved.channel).copied().unwrap_or(0),
+            _ => tracks.of_node(moved.node),
+        },
         path: moved.path,
+        elements: moved.elements,
     };
     let others = others
         .into_iter()
@@ -174,10 +209,10 @@ fn no_world(extras: &RawValue) -> Option<String> {
     extras.no_world
 }
 
-/// The channels that move nodes.
+/// The channels that move nodes or morph targets.
 fn moved(
     reader: &GltfReader<'_>,
-    nodes: &Nodes,
+    (nodes, morphs): (&Nodes, &Morphs),
     animation: &Animation<'_>,
     pointer: &str,
 ) -> Result<Vec<MovedChannel>, Diagnostic> {
@@ -193,7 +228,20 @@ fn moved(
         if node >= nodes.count() {
             return Err(reader.json.no_such("nodes", node, nodes.count(), &target));
         }
-        if nodes.is_origin(node) {
+        let is_of_weights = path == TargetPath::Weights;
+        let elements = match is_of_weights {
+            true => morphs.count(nodes, node),
+            false => 1,
+        };
+        if elements == 0 {
+            reader.warn(Code::NoMorphTargets, &target, || {
+                format!(
+                    "node {node} has no mesh with morph targets; the channel is copied unchanged"
+                )
+            });
+            continue;
+        }
+        if nodes.is_origin(node) && !is_of_weights {
             let message = format!(
                 "node {node} is marked as an origin (`tumbleOrigin`), and moves; remove the mark or the channel"
             );
@@ -203,7 +251,7 @@ fn moved(
             let message = format!("a second channel for the {path} of node {node}; remove one");
             return Err(reader.json.refuse(&target, Code::TwoChannels, message));
         }
-        if nodes.has_matrix(node) {
+        if nodes.has_matrix(node) && !is_of_weights {
             reader.warn(Code::NodeMatrix, &format!("/nodes/{node}/matrix"), || {
                 format!("node {node} is animated and has a matrix, which is decomposed into translation, \
                          rotation and scale")
@@ -223,6 +271,7 @@ fn moved(
         all.push(MovedChannel::new(
             reader,
             (index, node, path),
+            elements,
             (channel.sampler, sampler),
             &sampler_pointer,
         )?);
@@ -230,7 +279,7 @@ fn moved(
     Ok(all)
 }
 
-/// The node and the property that a channel moves; `None` if it moves anything else.
+/// The node and the property that a channel moves; `None` if it moves neither this nor morph targets.
 fn target(
     reader: &GltfReader<'_>,
     channel: &Channel,
@@ -238,8 +287,8 @@ fn target(
 ) -> Option<(usize, TargetPath)> {
     let target = &channel.target;
     let moved = target.moves();
-    let is_known = ["pointer", "weights"].contains(&&*target.path);
-    if target.node.is_some() && !is_known && TargetPath::named(&target.path).is_none() {
+    let is_known = target.path == "pointer" || TargetPath::named(&target.path).is_some();
+    if target.node.is_some() && !is_known {
         reader.warn(Code::TargetPath, &format!("{pointer}/target/path"), || {
             format!(
                 "`{}` is not known; the channel is copied unchanged",
@@ -287,7 +336,11 @@ struct Tracks {
 
 impl Tracks {
     fn of(nodes: &Nodes, moved: &[MovedChannel]) -> Self {
-        let mut tracks: BTreeSet<usize> = moved.iter().map(|moved| moved.node).collect();
+        // Weights move no node.
+        let moved = moved
+            .iter()
+            .filter(|moved| moved.path != TargetPath::Weights);
+        let mut tracks: BTreeSet<usize> = moved.map(|moved| moved.node).collect();
         nodes.complete(&mut tracks);
         Self {
             nodes: tracks.into_iter().collect(),

@@ -98,11 +98,21 @@ impl<'a> AnimationBaker<'a> {
             let is_moved = read.sampled.iter().any(|channel| channel.path == path);
             list == count || !is_moved
         };
+        let scalars = sampled.clip.set.scalar_count();
+        let is_there = |channel: &SampledChannel| match channel.path {
+            TargetPath::Weights => {
+                let keys = WrittenKeys::of_scalars(sampled.clip, channel.scalars());
+                channel.scalars().end <= scalars && (keys.is_some() || !sampled.is_at_keys)
+            }
+            _ => channel.track < tracks,
+        };
         let is_whole = fits(sampled.rotations.len(), TargetPath::Rotation)
             && fits(sampled.translations.len(), TargetPath::Translation)
             && fits(sampled.scales.len(), TargetPath::Scale)
-            && read.sampled.iter().all(|channel| channel.track < tracks);
-        let samplers_array = members.get("samplers").filter(|_| is_whole && count > 0);
+            && sampled.scalars.len() == sampled.times.len() * scalars
+            && read.sampled.iter().all(is_there);
+        let is_whole = is_whole && !sampled.times.is_empty();
+        let samplers_array = members.get("samplers").filter(|_| is_whole);
         let samplers_array = samplers_array.ok_or_else(|| {
             io::Error::new(
                 io::ErrorKind::InvalidInput,
@@ -136,9 +146,11 @@ impl<'a> AnimationBaker<'a> {
         let others = read.others.iter().filter(|_| self.is_cut);
         let channels: Vec<&SampledChannel> = read.sampled.iter().chain(others).collect();
         for channel in channels {
-            let written = match self.sampled.is_at_keys {
-                true => WrittenKeys::of(self.sampled.clip, channel.track, channel.path),
-                false => None,
+            let clip = self.sampled.clip;
+            let written = match (self.sampled.is_at_keys, channel.path) {
+                (true, TargetPath::Weights) => WrittenKeys::of_scalars(clip, channel.scalars()),
+                (true, path) => WrittenKeys::of(clip, channel.track, path),
+                (false, _) => None,
             };
             let (input, interpolation) = match &written {
                 Some(keys) => (self.input(&keys.times, edits)?, keys.sampler.name()),
@@ -235,6 +247,13 @@ impl<'a> AnimationBaker<'a> {
             TargetPath::Rotation => all(bytemuck::cast_slice(self.sampled.rotations)),
             TargetPath::Translation => all(bytemuck::cast_slice(self.sampled.translations)),
             TargetPath::Scale => all(bytemuck::cast_slice(self.sampled.scales)),
+            TargetPath::Weights => {
+                let scalars = self.sampled.clip.set.scalar_count();
+                let rows = self.sampled.scalars.chunks_exact(scalars);
+                rows.flat_map(|row| &row[channel.scalars()])
+                    .flat_map(|number| number.to_le_bytes())
+                    .collect()
+            }
         }
     }
 

@@ -6,8 +6,8 @@ use tumble::{TrackError, TrackSet, UNIT_TOLERANCE};
 use crate::diagnostic::{Code, Diagnostic, Location};
 use crate::gltf::reader::GltfReader;
 use crate::gltf::schema::{Accessor, Sampler, TargetPath};
-use crate::motion;
 use crate::motion::keys::{Duplicates, Origin, select};
+use crate::motion::{self, Motion, Scalar};
 use crate::quaternion::dot;
 use crate::warnings::Warnings;
 
@@ -17,6 +17,8 @@ pub(super) struct MovedChannel {
     pub(super) channel: usize,
     pub(super) node: usize,
     pub(super) path: TargetPath,
+    /// The number of elements of its values for each key: that of the morph targets for weights, 1 for others.
+    pub(super) elements: usize,
     /// Its sampler's index among the animation's samplers.
     pub(super) sampler_index: usize,
     pub(super) sampler: Sampler,
@@ -52,17 +54,20 @@ pub(super) struct ChannelKeys {
 enum ChannelValues {
     Rotations(Vec<Quat>, Vec<[Quat; 2]>),
     Vectors(Vec<Vec3>, Vec<[Vec3; 2]>),
+    /// In the orders `[key][target]` and `[key][side][target]`.
+    Weights(Vec<f32>, Vec<f32>),
 }
 
 impl MovedChannel {
-    /// `(channel, node, path)` is the index of the channel, its node and its target path; `pointer` is the JSON
-    /// pointer to its sampler.
+    /// `(channel, node, path)` is the index of the channel, its node and its target path, and `elements` the number of
+    /// elements of a key; `pointer` is the JSON pointer to its sampler.
     ///
     /// # Errors
     /// When the interpolation is unknown, or when the number of values does not fit the times.
     pub(super) fn new(
         reader: &GltfReader<'_>,
         (channel, node, path): (usize, usize, TargetPath),
+        elements: usize,
         (sampler_index, sampler): (usize, Sampler),
         pointer: &str,
     ) -> Result<Self, Diagnostic> {
@@ -85,9 +90,14 @@ impl MovedChannel {
             motion::ChannelInterpolation::Cubic => times.count.saturating_mul(3),
             _ => times.count,
         };
+        let needed = needed.saturating_mul(elements as u64);
         if values.count != needed {
+            let of_targets = match path {
+                TargetPath::Weights => format!(" of {elements} morph targets"),
+                _ => String::new(),
+            };
             let message = format!(
-                "{} values for {} times; {} needs {needed}",
+                "{} values for {} times{of_targets}; {} needs {needed}",
                 values.count,
                 times.count,
                 sampler.interpolation.as_deref().unwrap_or("LINEAR"),
@@ -98,6 +108,7 @@ impl MovedChannel {
             channel,
             node,
             path,
+            elements,
             sampler_index,
             sampler,
             interpolation,
@@ -114,7 +125,11 @@ impl MovedChannel {
             motion::ChannelInterpolation::Cubic => 3,
             _ => 1,
         };
-        size_of::<f64>() + values * size_of::<Quat>()
+        match self.path {
+            // Each target is a scalar with times.
+            TargetPath::Weights => self.elements * (size_of::<f64>() + values * size_of::<f32>()),
+            _ => size_of::<f64>() + values * size_of::<Quat>(),
+        }
     }
 
     /// The times in the file.
@@ -124,7 +139,7 @@ impl MovedChannel {
     pub(super) fn stored_times(&self, reader: &GltfReader<'_>) -> Result<Vec<f64>, Diagnostic> {
         let count = usize::try_from(self.times.count).unwrap_or(usize::MAX);
         reader.take(count, 2 * size_of::<f64>(), &self.input)?;
-        let times = reader.numbers(self.sampler.input, &self.times, 1, &self.input)?;
+        let times = reader.times(self.sampler.input, &self.times, &self.input)?;
         reader.warn_of_stride(&self.times);
         if let Some(time) = times.iter().find(|time| **time < 0.0) {
             reader.warn(Code::NegativeTime, &self.input, || {
@@ -144,9 +159,10 @@ impl MovedChannel {
         times: &InputTimes,
         duplicates: Duplicates,
     ) -> Result<ChannelKeys, Diagnostic> {
-        let width = self.path.width();
+        let width = self.path.width() * self.elements;
         // Memory of one key: its numbers in f64, its index in the list of kept keys, and its quaternion.
-        let each = 8 * self.values.count.div_ceil(times.len().max(1) as u64) as usize * width + 40;
+        let elements = self.values.count.div_ceil(times.len().max(1) as u64) as usize;
+        let each = 8 * elements * self.path.width() + 40;
         let _borrowed = reader.borrow(times.len(), each, &self.output)?;
         let mut times = times.0.clone();
         if times.is_empty() {
@@ -157,7 +173,8 @@ impl MovedChannel {
                 )
             });
         }
-        let numbers = reader.numbers(self.sampler.output, &self.values, width, &self.output)?;
+        let element = self.path.width();
+        let numbers = reader.numbers(self.sampler.output, &self.values, element, &self.output)?;
         reader.warn_of_stride(&self.values);
         let is_cubic = self.interpolation == motion::ChannelInterpolation::Cubic;
         let key_width = if is_cubic { 3 * width } else { width };
@@ -232,6 +249,19 @@ impl MovedChannel {
                 let tangents = tangents.collect();
                 ChannelValues::Vectors(keys().map(|key| vector(value(key, 1))).collect(), tangents)
             }
+            TargetPath::Weights => {
+                let values = keys().flat_map(|key| value(key, 1).iter().map(|&it| it as f32));
+                let mut tangents = Vec::new();
+                for key in keys().filter(|_| is_cubic) {
+                    for side in [0, 2] {
+                        match tangent(key, side) {
+                            Some(slopes) => tangents.extend(slopes.iter().map(|&it| it as f32)),
+                            None => tangents.extend(std::iter::repeat_n(0.0f32, width)),
+                        }
+                    }
+                }
+                ChannelValues::Weights(values.collect(), tangents)
+            }
         };
         Ok(ChannelKeys { times, values })
     }
@@ -273,6 +303,42 @@ impl ChannelKeys {
             true => Ok(()),
             false => set.set_tangents(track, tangents),
         }
+    }
+
+    /// Adds a scalar for each morph target; `name` gives their names.
+    ///
+    /// # Errors
+    /// When a number is not finite, or too large.
+    pub(super) fn push_weights(
+        &self,
+        motion: &mut Motion,
+        (elements, interpolation): (usize, motion::ChannelInterpolation),
+        name: impl Fn(usize) -> String,
+    ) -> Result<(), TrackError> {
+        let ChannelValues::Weights(values, tangents) = &self.values else {
+            return Ok(());
+        };
+        let scalar = Scalar {
+            interpolation: Some(interpolation),
+            ..Scalar::default()
+        };
+        for target in 0..elements {
+            let keys: Vec<f32> = values
+                .iter()
+                .skip(target)
+                .step_by(elements)
+                .copied()
+                .collect();
+            let slopes: Vec<f32> = tangents
+                .iter()
+                .skip(target)
+                .step_by(elements)
+                .copied()
+                .collect();
+            let slopes = slopes.as_chunks::<2>().0;
+            motion.add_scalar(scalar, &name(target), &self.times, &keys, slopes)?;
+        }
+        Ok(())
     }
 
     /// Adds these translations or scales to the last track.

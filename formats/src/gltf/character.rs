@@ -149,6 +149,7 @@ fn repeats_rest(clip: &Motion, track: usize, path: TargetPath) -> bool {
         TargetPath::Rotation => clip.set.track(track).keys.first() == Some(&joint.rest.rotation),
         TargetPath::Translation => vector(Channel::Translation) == Some(joint.rest.translation),
         TargetPath::Scale => vector(Channel::Scale) == Some(joint.rest.scale),
+        TargetPath::Weights => false,
     }
 }
 

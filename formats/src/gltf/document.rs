@@ -20,7 +20,7 @@ use crate::gltf::json::{Json, JsonMembers};
 use crate::gltf::nodes::Nodes;
 use crate::gltf::prune::{prune, prune_replaced};
 use crate::gltf::reader::GltfReader;
-use crate::gltf::schema::{Animation, Channel};
+use crate::gltf::schema::{Animation, Channel, TargetPath};
 use crate::gltf::skins;
 use crate::gltf::uri;
 use crate::limits::Limits;
@@ -113,15 +113,19 @@ impl Document for GltfDocument {
         let has = |list: &&str| !json.optional::<&RawValue>(list).is_empty();
         let lists = lists.into_iter().filter(has).map(str::to_owned);
         let animations: Vec<Animation<'_>> = json.optional("animations");
-        let channels = animations.iter().flat_map(|animation| &animation.channels);
+        let channels = animations.iter().enumerate().flat_map(|(animation, all)| {
+            let channels = all.channels.iter().enumerate();
+            channels.map(move |(channel, raw)| (animation, channel, raw))
+        });
         let mut others: Vec<String> = channels
-            .filter_map(|channel| {
-                let channel: Channel = serde_json::from_str(channel.get()).ok()?;
-                channel
-                    .target
-                    .moves()
-                    .is_none()
-                    .then_some(channel.target.path)
+            .filter_map(|(animation, index, raw)| {
+                let channel: Channel = serde_json::from_str(raw.get()).ok()?;
+                let is_read = match channel.target.moves() {
+                    // Those of a node without morph targets are not.
+                    Some((_, TargetPath::Weights)) => self.reads(animation, index),
+                    moved => moved.is_some(),
+                };
+                (!is_read).then_some(channel.target.path)
             })
             .map(|path| format!("channels of `{path}`"))
             .collect();
@@ -244,7 +248,23 @@ impl GltfDocument {
         // All other warnings were already reported when the file was read.
         let mut warnings = reader.warnings.into_inner().into_list();
         warnings.retain(|warning| [Code::StaysOutside, Code::StaysWhole].contains(&warning.code));
+        if let Change::Animations(clips) = change
+            && clips.iter().any(|clip| clip.set.scalar_count() > 0)
+        {
+            let message =
+                "animations of another file have no morph targets here, left out: the scalars";
+            warnings.push(Diagnostic::new(&options.name, Code::NoRoom, message));
+        }
         Ok(warnings)
+    }
+
+    /// Whether a channel of an animation is in the clip.
+    fn reads(&self, animation: usize, channel: usize) -> bool {
+        let read = self.animations.get(animation).and_then(Option::as_ref);
+        read.is_some_and(|read| {
+            let mut channels = read.sampled.iter().chain(&read.others);
+            channels.any(|read| read.channel == channel)
+        })
     }
 
     /// The clips whose keys are written, with their animations.
@@ -272,8 +292,8 @@ impl GltfDocument {
             if cuts && read.beside > 0 {
                 reader.warn(Code::StaysWhole, &format!("/animations/{index}"), || {
                     let channels = match read.beside {
-                        1 => "1 channel of weights or another property is".to_owned(),
-                        count => format!("{count} channels of weights and other properties are"),
+                        1 => "1 channel of another property is".to_owned(),
+                        count => format!("{count} channels of other properties are"),
                     };
                     format!(
                         "{channels} not cut but copied whole, at their times; the animation is as long as its \
@@ -354,7 +374,8 @@ fn named_file(json: &Json<'_>) -> Option<(String, String)> {
 
 /// How many bytes the samples of a clip take.
 fn sample_bytes((read, (_, sampled)): (&ReadAnimation, &(usize, SampledClip<'_>))) -> u64 {
-    let widths = read.sampled.iter().map(|channel| channel.path.width());
+    let widths = read.sampled.iter();
+    let widths = widths.map(|channel| channel.path.width() * channel.elements);
     let numbers = 1 + widths.sum::<usize>();
     4 * numbers as u64 * sampled.times.len() as u64
 }

@@ -1,12 +1,12 @@
 //! glTF 2.0, as text (`.gltf`) and as GLB.
 //!
 //! Each animation becomes a clip. Its tracks are the nodes that it moves, their ancestors, and the other joints of
-//! their skins. The parts of a file that are read are checked. Other parts may contain anything, and are written back
+//! their skins; the weights of morph targets are scalars. The parts of a file that are read are checked. Other parts may contain anything, and are written back
 //! byte for byte when the file is written with other keys.
 //!
 //! Reading: `container` splits a GLB into its chunks, `json` finds values in the text without copying them, `reader`
 //! returns the bytes of views and the numbers of accessors, each loaded and decoded once, `nodes` contains the
-//! hierarchy, `channel` the keys of one channel, and `animation` makes a clip of one animation. Writing the same file
+//! hierarchy, `morphs` the morph targets of meshes, `channel` the keys of one channel, and `animation` makes a clip of one animation. Writing the same file
 //! again: `document` keeps it, `bake` replaces the keys of one animation by `edits` of the text and by bytes that
 //! `data` appends, `prune` leaves out the keys that were replaced, and `gather` embeds the files beside a `.gltf` in a GLB. Writing clips of any format to a new
 //! file: `write_new`.
@@ -26,6 +26,7 @@ mod key_bytes;
 mod matrix;
 pub mod meshes;
 mod meshopt;
+mod morphs;
 mod nodes;
 mod prune;
 pub(crate) mod quantized;
@@ -50,6 +51,7 @@ use crate::format::{Format, FormatOption, Loaded, ReadOptions};
 use crate::gltf::container::Container;
 use crate::gltf::document::GltfDocument;
 use crate::gltf::json::Json;
+use crate::gltf::morphs::Morphs;
 use crate::gltf::nodes::Nodes;
 use crate::gltf::reader::{GltfReader, MESHOPT};
 use crate::gltf::schema::{Asset, Buffer};
@@ -191,11 +193,12 @@ pub fn read_gltf(
         }
     }
     let nodes = Nodes::read(&json)?;
+    let morphs = Morphs::read(&reader, &nodes)?;
     let mut loaded = Loaded::default();
     let mut read = Vec::with_capacity(animations);
     let mut faults: HashMap<(Option<Location>, String), usize> = HashMap::new();
     for index in 0..animations {
-        match animation::read(index, &reader, &nodes, options) {
+        match animation::read(index, &reader, (&nodes, &morphs), options) {
             Ok(found) => {
                 let (clip, channels) = found.unzip();
                 loaded.clips.extend(clip);
@@ -219,10 +222,11 @@ pub fn read_gltf(
     }
     if loaded.clips.is_empty() && loaded.refused.is_empty() {
         let message = match animations {
-            1 => "the only animation moves no node: there is nothing to sample".to_owned(),
-            _ => {
-                format!("none of {animations} animations moves a node: there is nothing to sample")
-            }
+            1 => "the only animation moves no node and no morph target: there is nothing to sample"
+                .to_owned(),
+            _ => format!(
+                "none of {animations} animations moves a node or a morph target: there is nothing to sample"
+            ),
         };
         return Err(json.refuse("/animations", Code::NoAnimations, message));
     }

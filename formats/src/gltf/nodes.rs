@@ -123,6 +123,11 @@ impl Nodes {
         self.written_joints.get(node)
     }
 
+    /// The mesh of a node.
+    pub(super) fn mesh(&self, node: usize) -> Option<usize> {
+        self.list[node].mesh
+    }
+
     pub(super) fn has_matrix(&self, node: usize) -> bool {
         self.list[node].matrix.is_some()
     }

@@ -4,6 +4,7 @@ use std::borrow::Cow;
 use std::fmt;
 
 use serde::Deserialize;
+use serde::de::IgnoredAny;
 use serde_json::value::RawValue;
 
 use crate::gltf::json::JsonMembers;
@@ -89,6 +90,27 @@ pub(super) struct Mesh<'a> {
     pub(super) primitives: Vec<Primitive<'a>>,
 }
 
+/// The parts of a mesh that concern morph targets.
+#[derive(Deserialize)]
+pub(super) struct MorphMesh<'a> {
+    pub(super) primitives: Vec<MorphPrimitive>,
+    #[serde(borrow)]
+    pub(super) extras: Option<&'a RawValue>,
+}
+
+#[derive(Deserialize)]
+pub(super) struct MorphPrimitive {
+    #[serde(default)]
+    pub(super) targets: Vec<IgnoredAny>,
+}
+
+/// The names of a mesh's morph targets, as most exporters write them.
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct MorphExtras {
+    pub(super) target_names: Vec<String>,
+}
+
 #[derive(Deserialize)]
 pub(super) struct Primitive<'a> {
     pub(super) attributes: Attributes,
@@ -155,6 +177,8 @@ pub(super) enum TargetPath {
     Translation,
     Rotation,
     Scale,
+    /// The weights of the morph targets of the node's mesh.
+    Weights,
 }
 
 impl TargetPath {
@@ -163,6 +187,7 @@ impl TargetPath {
             "translation" => Self::Translation,
             "rotation" => Self::Rotation,
             "scale" => Self::Scale,
+            "weights" => Self::Weights,
             _ => return None,
         })
     }
@@ -172,6 +197,7 @@ impl TargetPath {
             Self::Translation => "translation",
             Self::Rotation => "rotation",
             Self::Scale => "scale",
+            Self::Weights => "weights",
         }
     }
 
@@ -180,25 +206,24 @@ impl TargetPath {
         match self {
             Self::Rotation => "VEC4",
             Self::Translation | Self::Scale => "VEC3",
+            Self::Weights => "SCALAR",
         }
     }
 
-    /// How many numbers a value has.
+    /// How many numbers an element of such an accessor has. A key of weights has an element for each morph target, one of
+    /// the others a single one.
     pub(super) fn width(self) -> usize {
         match self {
             Self::Rotation => 4,
             Self::Translation | Self::Scale => 3,
+            Self::Weights => 1,
         }
     }
 }
 
 impl fmt::Display for TargetPath {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Translation => "translation",
-            Self::Rotation => "rotation",
-            Self::Scale => "scale",
-        })
+        f.write_str(self.name())
     }
 }
 

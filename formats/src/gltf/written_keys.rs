@@ -1,7 +1,9 @@
 //! The keys of one channel as a file stores them: with separate times and a separate sampler.
 
+use std::ops::Range;
+
 use glam::Quat;
-use tumble::Channel;
+use tumble::{Channel, ScalarKeys};
 
 use crate::gltf::schema::TargetPath;
 use crate::motion::signs::continue_signs;
@@ -32,7 +34,44 @@ impl WrittenKeys {
                 let sampler = samplers.map(|channels| channels.scale);
                 Self::of_vectors(clip, track, Channel::Scale, sampler)
             }
+            // They belong to no track.
+            TargetPath::Weights => None,
         }
+    }
+
+    /// The keys of neighbouring scalars, which are the weights of one channel; `None` if they do not have the same times and
+    /// the same interpolation.
+    pub(super) fn of_scalars(clip: &Motion, scalars: Range<usize>) -> Option<Self> {
+        let (first, stated) = (clip.set.scalar(scalars.start)?, clip.scalar(scalars.start));
+        let all: Option<Vec<ScalarKeys<'_>>> = scalars
+            .map(|index| {
+                let keys = clip.set.scalar(index)?;
+                let is_same = keys.times == first.times
+                    && clip.scalar(index).interpolation == stated.interpolation;
+                is_same.then_some(keys)
+            })
+            .collect();
+        let all = all?;
+        let sampler = stated.interpolation.unwrap_or(ChannelInterpolation::Linear);
+        let sampler = lasting(sampler, first.times);
+        let mut values = Vec::new();
+        for key in 0..first.times.len() {
+            let slope = |keys: &ScalarKeys<'_>, side: usize| {
+                keys.tangents.get(key).map_or(0.0, |slopes| slopes[side])
+            };
+            if sampler == ChannelInterpolation::Cubic {
+                values.extend(all.iter().map(|keys| slope(keys, 0)));
+            }
+            values.extend(all.iter().map(|keys| keys.keys[key]));
+            if sampler == ChannelInterpolation::Cubic {
+                values.extend(all.iter().map(|keys| slope(keys, 1)));
+            }
+        }
+        Some(Self {
+            times: first.times.to_vec(),
+            values,
+            sampler,
+        })
     }
 
     /// `sampler` is `None` if the clip does not specify the interpolation of its tracks, and `Some(None)` if the

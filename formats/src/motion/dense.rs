@@ -56,6 +56,15 @@ impl Motion {
     /// # Errors
     /// When a sample is not a valid key.
     pub fn with_keys(&self, samples: &Samples) -> Result<Self, TrackError> {
+        let dense = self.with_track_keys(samples)?;
+        dense.with_sampled_scalars_of(self, samples)
+    }
+
+    /// As [`with_keys`](Self::with_keys), without the scalars.
+    ///
+    /// # Errors
+    /// As there.
+    pub(crate) fn with_track_keys(&self, samples: &Samples) -> Result<Self, TrackError> {
         let tracks = self.set.track_count();
         let mut set = TrackSet::new();
         for track in 0..tracks {
@@ -85,13 +94,12 @@ impl Motion {
             translation: line(channels.translation),
             scale: line(channels.scale),
         });
-        let dense = Self {
+        Ok(Self {
             set,
             channels: channels.collect(),
             rate: None,
             ..self.without_tracks()
-        };
-        dense.with_sampled_scalars_of(self, samples)
+        })
     }
 
     /// The samples at the first and the last key time only, for formats that write the keys of the clip

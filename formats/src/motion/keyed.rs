@@ -1,11 +1,11 @@
 //! The keys of a clip as samples, for formats that store all joints at the same times.
 
 use glam::{Quat, Vec3};
-use tumble::{Channel, Device, Engine, Error};
+use tumble::{Channel, Device, Engine, Error, SampleTimes, ScalarKeys, ScalarQuantity};
 
 use crate::feature::Feature;
 use crate::format::Format;
-use crate::motion::sample::Samples;
+use crate::motion::sample::{ChannelMethods, Samples};
 use crate::motion::signs::continue_signs;
 use crate::motion::{ChannelInterpolation, Motion};
 
@@ -86,8 +86,20 @@ pub fn keys_for(
             has_lists && (0..clip.set.track_count()).all(has_one_list)
         }
     };
-    match keyed(clip) {
-        Ok(samples) if !(is_kept && keys_per_channel) => Ok((samples, false)),
+    let keyed = match format.supports(Feature::Scalars) {
+        true => keyed(clip),
+        false => keyed_tracks(clip),
+    };
+    match keyed {
+        Ok(mut samples) if !(is_kept && keys_per_channel) => {
+            // Those that the format leaves out may have other times.
+            if samples.scalars.is_empty() && clip.set.scalar_count() > 0 {
+                let (engine, times) = (Engine::new(Device::Cpu)?, samples.times.clone());
+                let (methods, frames) = (ChannelMethods::AUTHORED, SampleTimes::at(times));
+                samples.scalars = methods.scalars(&engine, clip, &frames, ScalarQuantity::Value)?;
+            }
+            Ok((samples, false))
+        }
         Err(error) if !takes_keys => Err(error.into()),
         _ => Ok((clip.ends(&Engine::new(Device::Cpu)?)?, true)),
     }
@@ -99,6 +111,19 @@ pub fn keys_for(
 /// # Errors
 /// When the key times of channels differ, or a channel is a cubic spline with tangents.
 pub fn keyed(clip: &Motion) -> Result<Samples, KeyedError> {
+    let scalars: Vec<ScalarKeys<'_>> = clip.scalar_keys().collect();
+    keys_of(clip, &scalars)
+}
+
+/// As [`keyed`], without the scalars of the clip, which may have other times.
+///
+/// # Errors
+/// As [`keyed`].
+pub(crate) fn keyed_tracks(clip: &Motion) -> Result<Samples, KeyedError> {
+    keys_of(clip, &[])
+}
+
+fn keys_of(clip: &Motion, scalars: &[ScalarKeys<'_>]) -> Result<Samples, KeyedError> {
     let set = &clip.set;
     let tracks = set.track_count();
     let channels = [Channel::Translation, Channel::Scale];
@@ -110,7 +135,7 @@ pub fn keyed(clip: &Motion) -> Result<Samples, KeyedError> {
     };
     let all = (0..tracks).flat_map(lists);
     let times = all
-        .chain(clip.scalar_keys().map(|keys| keys.times))
+        .chain(scalars.iter().map(|keys| keys.times))
         .max_by_key(|times| times.len())
         .unwrap_or_default()
         .to_vec();
@@ -124,7 +149,7 @@ pub fn keyed(clip: &Motion) -> Result<Samples, KeyedError> {
             return Err(KeyedError::Cubic { track, name });
         }
     }
-    for (scalar, keys) in clip.scalar_keys().enumerate() {
+    for (scalar, keys) in scalars.iter().enumerate() {
         if keys.times.len() > 1 && keys.times != times || !keys.tangents.is_empty() {
             let name = keys.name.to_owned();
             return Err(KeyedError::Scalar { scalar, name });
@@ -161,7 +186,7 @@ pub fn keyed(clip: &Motion) -> Result<Samples, KeyedError> {
         }
     }
     for sample in 0..samples.times.len() {
-        let values = clip.scalar_keys().filter_map(|keys| at(keys.keys, sample));
+        let values = scalars.iter().filter_map(|keys| at(keys.keys, sample));
         samples.scalars.extend(values);
     }
     continue_signs(&mut samples.rotations, tracks);

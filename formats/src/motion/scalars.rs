@@ -3,9 +3,9 @@
 use std::f32::consts::PI;
 
 use glam::Vec3;
-use tumble::{Error, ScalarKeys, TrackError};
+use tumble::{Channel, Error, ScalarKeys, TrackError, VectorMethod};
 
-use crate::motion::sample::Samples;
+use crate::motion::sample::{ChannelMethods, Samples};
 use crate::motion::{ChannelInterpolation, Motion};
 
 /// The kind and the limits of a scalar of a clip; its name and its keys are in the clip's set.
@@ -130,6 +130,38 @@ impl Motion {
             keys.times[*key],
             keys.times[key + 1]
         ))
+    }
+
+    /// The one method for all positions, scales and scalars that change, but for steps; `None` where their samplers differ.
+    /// A robot whose root stands still is interpolated as its joints are.
+    #[must_use]
+    pub fn numbers_method(&self, methods: &ChannelMethods) -> Option<VectorMethod> {
+        if let Some(method) = methods.method.0 {
+            return Some(method.scalar_method());
+        }
+        let channels = [Channel::Translation, Channel::Scale];
+        let tracks = 0..self.set.track_count();
+        let mut vectors = tracks
+            .flat_map(|track| channels.map(|channel| (track, channel)))
+            .filter_map(|(track, channel)| self.set.vector_keys(channel, track));
+        let is_moved = vectors.any(|keys| {
+            !keys.tangents.is_empty() || keys.keys.iter().any(|key| *key != keys.keys[0])
+        });
+        let of_vectors = is_moved.then(|| methods.vector_method_of(self));
+        let changing = self.scalar_keys().enumerate().filter(|(index, keys)| {
+            let changes = keys.keys.iter().any(|key| *key != keys.keys[0]);
+            (changes || !keys.tangents.is_empty()) && !self.scalar(*index).is_step()
+        });
+        let of_scalars = changing.map(|(index, _)| {
+            Some(match self.scalar(index).interpolation {
+                Some(ChannelInterpolation::Cubic) => VectorMethod::GltfCubic,
+                Some(_) => VectorMethod::Linear,
+                None => VectorMethod::BesselOverhauser,
+            })
+        });
+        let mut all = of_vectors.into_iter().chain(of_scalars);
+        let first = all.next().unwrap_or(Some(VectorMethod::BesselOverhauser));
+        first.filter(|_| all.all(|method| method == first))
     }
 
     /// The keys of all scalars.

@@ -98,7 +98,18 @@ impl Robot {
     /// # Errors
     /// When the file cannot be opened, is no robot, is larger than 4 MiB, or its bodies are no tree.
     pub fn open(path: &Path) -> Result<Self, Diagnostic> {
-        let files = Files::open(path, limits())?;
+        Self::of(&Files::open(path, limits())?)
+    }
+
+    /// As [`Robot::open`], from the bytes of a file that includes no others; `name` is the input's name in messages.
+    ///
+    /// # Errors
+    /// As there, and when it includes a file.
+    pub fn read(name: &str, bytes: Vec<u8>) -> Result<Self, Diagnostic> {
+        Self::of(&Files::of_bytes(name, bytes, limits())?)
+    }
+
+    fn of(files: &Files) -> Result<Self, Diagnostic> {
         let documents = files.parse()?;
         let root = documents.root();
         match documents.tag(root) {

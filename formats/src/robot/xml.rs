@@ -100,6 +100,27 @@ impl Files {
     pub(super) fn open(path: &Path, limits: Limits) -> Result<Self, Diagnostic> {
         let folder = path.parent().unwrap_or(Path::new(""));
         let first = text(Source::open(path, false)?, limits.file)?;
+        Self::with_included(first, path, Some(folder), limits)
+    }
+
+    /// The text of a file in memory, which can include no others.
+    pub(super) fn of_bytes(name: &str, bytes: Vec<u8>, limits: Limits) -> Result<Self, Diagnostic> {
+        let length = bytes.len();
+        if length as u64 > limits.file {
+            let message = format!("has {length} bytes; robots have at most {}", limits.file);
+            return Err(Diagnostic::new(name, Code::FileTooLong, message));
+        }
+        let first = text_of(name.to_owned(), bytes)?;
+        Self::with_included(first, Path::new(name), None, limits)
+    }
+
+    /// A file with those that it includes from `folder`.
+    fn with_included(
+        first: TextFile,
+        path: &Path,
+        folder: Option<&Path>,
+        limits: Limits,
+    ) -> Result<Self, Diagnostic> {
         let mut rest = limits.file.saturating_sub(first.text.len() as u64);
         let mut this = Self {
             files: vec![first],
@@ -131,6 +152,13 @@ impl Files {
                         format!("includes `{name}`, which leads out of the file's folder");
                     return Err(refuse(Code::RobotInclude, message));
                 };
+                if folder.is_none() {
+                    let message = format!(
+                        "includes `{}`, which is not found from bytes in memory; read it from its file",
+                        name.display()
+                    );
+                    return Err(refuse(Code::RobotInclude, message));
+                }
                 if this.paths.contains(&name) {
                     let message = format!("includes `{}` twice", name.display());
                     return Err(refuse(Code::RobotInclude, message));
@@ -138,6 +166,7 @@ impl Files {
                 found.push((element, name));
             }
             for (element, name) in found {
+                let folder = folder.unwrap_or(Path::new(""));
                 let file = text(Source::open_beneath(folder, &name)?, rest)?;
                 rest = rest.saturating_sub(file.text.len() as u64);
                 this.included.insert(element, this.files.len());
@@ -165,7 +194,11 @@ impl Files {
 
 fn text(source: Source, limit: u64) -> Result<TextFile, Diagnostic> {
     let name = source.name.clone();
-    match String::from_utf8(source.into_bytes(limit)?) {
+    text_of(name, source.into_bytes(limit)?)
+}
+
+fn text_of(name: String, bytes: Vec<u8>) -> Result<TextFile, Diagnostic> {
+    match String::from_utf8(bytes) {
         Ok(text) => Ok(TextFile { name, text }),
         Err(_) => Err(Diagnostic::new(
             name,

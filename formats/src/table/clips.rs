@@ -19,9 +19,9 @@ use crate::table::clips::keys::RowKeys;
 use crate::table::columns::Table;
 use crate::table::groups::{labels, numbered, rows_by_code};
 use crate::table::plan::{Parts, RowLayout, TablePlan};
-#[cfg(feature = "parquet")]
-use crate::table::skeleton;
 use crate::table::times::{RowGroups, RowTimes, times};
+#[cfg(feature = "parquet")]
+use crate::table::{scalars, skeleton};
 use crate::time_order::{TimeOrder, time_order};
 use crate::warnings::Warnings;
 
@@ -92,6 +92,8 @@ pub(crate) fn clips(
             Ok(mut motion) => {
                 #[cfg(feature = "parquet")]
                 skeleton::attach_skeleton(&mut motion, index, &plan.notes);
+                #[cfg(feature = "parquet")]
+                scalars::attach_scalars(&mut motion, index, &plan.notes);
                 motion.index = index;
                 loaded.clips.push(motion);
             }

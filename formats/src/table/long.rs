@@ -16,7 +16,7 @@ use crate::motion::{Motion, SampledClip};
 use crate::names::distinct_names;
 use crate::quaternion::ComponentOrder;
 use crate::table::rows::{Batch, ComponentColumn, Head, RowSink, TimeColumn, invalid, names};
-use crate::table::skeleton;
+use crate::table::{scalars, skeleton};
 
 /// Begins the table of a result's rotations.
 pub(crate) fn write_rotations<'a, S: RowSink + 'a>(
@@ -283,7 +283,8 @@ fn notes(clips: &[SampledClip<'_>]) -> Vec<(String, String)> {
             .iter()
             .map(|(key, value)| (*key, value.clone()))
             .chain(rate)
-            .chain(skeleton);
+            .chain(skeleton)
+            .chain(scalars::note_of(sampled.clip));
         for (key, value) in clip_notes {
             match notes.iter().find(|(known, _)| known == key) {
                 None => notes.push((key.to_owned(), value)),

@@ -18,6 +18,8 @@ pub(crate) mod plan;
 #[cfg(feature = "parquet")]
 pub(crate) mod rows;
 #[cfg(feature = "parquet")]
+pub(crate) mod scalars;
+#[cfg(feature = "parquet")]
 pub(crate) mod skeleton;
 pub(crate) mod times;
 

@@ -318,6 +318,14 @@ class Clip:
         continuity: float | None = None,
         bias: float | None = None,
     ) -> DeviceArray: ...
+    def root_motion(
+        self,
+        rule: Literal["keep", "in-place", "extract"],
+        *,
+        up: _Ground = "y",
+        axis: _Axis | None = None,
+        joint: str | None = None,
+    ) -> Clip: ...
     def sampler(
         self,
         *,
@@ -1276,6 +1284,17 @@ def contacts(
     speed: float,
     window: int | None = None,
 ) -> NDArray[np.bool_]: ...
+def root_motion(
+    positions: _Array,
+    quaternions: _Array,
+    *,
+    order: _Order,
+    up: _Ground,
+    axis: _Axis | None = None,
+) -> tuple[_Double, _Double, _Double, _Double]: ...
+def root_after_loops(
+    positions: _Array, headings: _Array, loops: int, *, up: _Ground
+) -> tuple[_Double, _Double]: ...
 def mirror_pairs(names: Sequence[str]) -> list[int]: ...
 def mirrored_positions(
     positions: _Array, *, axis: _Axis, pairs: Sequence[int] | None = None

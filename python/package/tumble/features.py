@@ -1,4 +1,4 @@
-"""Numbers that people train on, of arrays: rotations as six numbers, headings, contacts, mirrored poses, and the 263
+"""Numbers that people train on, of arrays: rotations as six numbers, headings, root motion, contacts, mirrored poses, and the 263
 numbers of HumanML3D. All are computed in float64, with the same bits on every processor.
 
 >>> import tumble
@@ -14,6 +14,8 @@ from tumble._tumble import (
     mirrored_positions,
     mirrored_rotations,
     positions_of_humanml3d,
+    root_after_loops,
+    root_motion,
     rotations_of_six,
     six,
 )
@@ -26,6 +28,8 @@ __all__ = [
     "mirrored_positions",
     "mirrored_rotations",
     "positions_of_humanml3d",
+    "root_after_loops",
+    "root_motion",
     "rotations_of_six",
     "six",
 ]

@@ -8,13 +8,18 @@ use glam::{DVec3, Vec3};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
-use tumble::{Channel, Layout};
+use tumble::{Channel, Device, Engine, Layout};
+use tumble_formats::root_motion::{
+    RootMotionOptions, RootMotionRule, keys_with_root_motion, root_joint, track_samples,
+};
 
 use crate::arrays::{ListArgument, Order};
 use crate::build::{ClipArguments, ClipKeys, KeysLayout, put_scalars, scalar_keys};
 use crate::clip::{Clip, counted};
 use crate::engine::{default_engine, layout_named};
 use crate::errors::{guarded, input};
+use crate::features::heading_source;
+use crate::names::option_named;
 use crate::options::frame_rate;
 use crate::pickle::{is_same, state};
 use crate::run::work;
@@ -377,6 +382,60 @@ impl Clip {
             device_array,
             options,
         )
+    }
+
+    /// The clip without its motion over the ground (`rule` "in-place"), or with a joint, `root_motion`, that has it and
+    /// carries the root ("extract"), at the key times of all tracks. `up` and `axis` are those of `features.heading`;
+    /// `joint` names the root, by default the joint that moves and whose ancestors do not. Scalars keep their keys; cubic
+    /// splines become lines.
+    ///
+    /// >>> import tumble
+    /// >>> clip = tumble.Clip([0.0, 1.0], [[0, 0, 0, 1]] * 2, translations=[[0, 1, 0], [0, 1, 2]])
+    /// >>> clip.root_motion("in-place").translations(0)[1]
+    /// array([[0., 1., 0.],
+    ///        [0., 1., 0.]], dtype=float32)
+    /// >>> clip.root_motion("extract").names
+    /// ['root_motion', '']
+    #[pyo3(signature = (rule, *, up="y", axis=None, joint=None))]
+    fn root_motion(
+        &self,
+        py: Python<'_>,
+        rule: &str,
+        up: &str,
+        axis: Option<&Bound<'_, PyAny>>,
+        joint: Option<String>,
+    ) -> PyResult<Self> {
+        let rule: RootMotionRule = option_named(rule, "rule")?;
+        let options = RootMotionOptions {
+            ground: option_named(up, "up")?,
+            heading: heading_source(axis)?,
+            joint,
+        };
+        let motion = self.motion.clone();
+        let (treated, is_of_file) = work(py, motion.key_count(), move || {
+            let refused = |error: &dyn std::fmt::Display| input(error.to_string());
+            let engine = Engine::new(Device::Cpu).map_err(|error| refused(&error))?;
+            let samples = track_samples(&motion, &engine).map_err(|error| refused(&error))?;
+            let treated = keys_with_root_motion(&motion, &samples, &options, rule);
+            let treated = treated.map_err(|error| refused(&error))?;
+            // A file that is written again gets no new channels.
+            let is_of_file = match rule {
+                RootMotionRule::Keep => true,
+                RootMotionRule::InPlace => {
+                    let root = root_joint(&motion, &options).map_err(|error| refused(&error))?;
+                    motion.root_has_keys(root)
+                }
+                RootMotionRule::Extract => false,
+            };
+            Ok((treated, is_of_file))
+        })?;
+        Ok(match is_of_file {
+            true => self.with_keys(treated),
+            false => Self {
+                motion: Arc::new(treated),
+                source: None,
+            },
+        })
     }
 
     /// A `Sampler`: it evaluates single rotations and poses, in loops that need one at a time, with the bits of

@@ -22,11 +22,13 @@ use crate::arguments::output::{
 };
 use crate::arguments::results::ResultArguments;
 use crate::arguments::robot::DialectArguments;
+use crate::arguments::root_motion::RootMotionArguments;
 use crate::arguments::time::{
     AtKeysArguments, EndFrameArguments, GapArguments, SampleChoice, SamplingArguments,
 };
 use crate::messages::exit::Failure;
 use crate::messages::words;
+use tumble_formats::root_motion::RootMotionRule;
 use tumble_formats::sample::MethodChoice;
 
 /// Evaluate keyframe tracks at every frame
@@ -47,6 +49,7 @@ Examples:
   tumble eval walks -o results --resume        a directory tree; skips results that are done
   find . -name '*.dat' | tumble eval --files-from - -o results
   tumble eval walk.glb --fps 60 -o walk60.glb  meshes and all else are kept
+  tumble eval walk.bvh --root-motion in-place -o in_place.npz
   tumble eval clips -o out --to bvh --resume   formats may be mixed
   tumble eval lafan1 -o out --fps 50 --robot g1.xml --dialect mjlab --resume
   seq 64 | xargs -P8 -I{} tumble eval clips -o out --resume --shard {}/64; tumble merge out
@@ -95,6 +98,8 @@ pub(crate) struct Arguments {
     pub(super) output: OutputArguments,
     #[command(flatten)]
     pub(super) dialect: DialectArguments,
+    #[command(flatten)]
+    pub(super) root: RootMotionArguments,
     /// NPZ to NPZ: interpolate these arrays, which have a number for each frame, linearly instead of
     /// leaving them out
     #[arg(long, value_name = "ARRAYS", value_delimiter = ',')]
@@ -160,6 +165,7 @@ impl Arguments {
 
     /// Refuses, before any work, options that have no effect on any kind that the results may have.
     pub(super) fn check_before(&self, format: &'static Format) -> Result<(), Failure> {
+        self.root.check(&self.command_line)?;
         let mut kinds = Vec::new();
         if let Some(dialect) = self.dialect.chosen() {
             self.check_dialect(dialect)?;
@@ -211,6 +217,11 @@ impl Arguments {
         ];
         let on = format!("--dialect {}", dialect.name);
         let remedy = "it has all joints of the robot at frames of one rate; leave it out";
+        if self.root.rule() == RootMotionRule::Extract {
+            return Err(Failure::usage(format!(
+                "--root-motion extract has no effect on {on}, which has no joint for it; leave it out"
+            )));
+        }
         self.command_line.refuse(&options, &on, remedy)
     }
 

@@ -5,7 +5,9 @@ use std::borrow::Cow;
 
 use glam::{DVec3, Quat, Vec3};
 use serde::Serialize;
-use tumble::{Engine, Error, Layout, Quantity, SampleTimes, ScalarQuantity, Timeline, TrackSet};
+use tumble::{
+    Device, Engine, Error, Layout, Quantity, SampleTimes, ScalarQuantity, Timeline, TrackSet,
+};
 use tumble_formats::dialect::write::WrittenDialect;
 use tumble_formats::end_frame::{EndFrame, EndRows, sample_to_end};
 use tumble_formats::format::{Document, FormatOption, MotionOptions, ResultShape};
@@ -13,6 +15,9 @@ use tumble_formats::motion::{Joint, Motion, SampledClip, Transform};
 use tumble_formats::origin::origin_of;
 use tumble_formats::poses::{Poses, SCALAR, TRANSFORM, WORLD};
 use tumble_formats::quaternion::ComponentOrder;
+use tumble_formats::root_motion::{
+    RootMotionRule, keys_with_root_motion, track_samples, with_root_motion,
+};
 use tumble_formats::sample::{MethodChoice, Samples};
 use tumble_formats::world::{HierarchyError, world};
 use tumble_formats::{Code, Diagnostic};
@@ -148,8 +153,12 @@ impl EvaluationJob<'_> {
         let tracks = &self.arguments.inputs.tracks;
         if kind == ResultKind::Motion {
             let some = self.arguments.command_line.has("tracks");
+            let more = self.arguments.root.rule() == RootMotionRule::Extract;
             let some = some.then_some("some tracks make");
-            document_to_rewrite(work, some);
+            document_to_rewrite(
+                work,
+                some.or(more.then_some("a joint with root motion makes")),
+            );
             let selected = clips
                 .iter()
                 .map(|&clip| tracks.select_with_ancestors(clip, name));
@@ -406,6 +415,7 @@ impl EvaluationJob<'_> {
         // With --tracks, the result is a new file.
         self.arguments.output.is_rotations()
             && !self.arguments.command_line.has("tracks")
+            && self.arguments.root.rule() != RootMotionRule::Extract
             && self.keeps(target)
     }
 
@@ -437,6 +447,25 @@ impl EvaluationJob<'_> {
         self.written(name, clips, &times, target, None)
     }
 
+    /// A clip whose keys have the root motion that is asked for.
+    fn treated_keys<'b>(
+        &mut self,
+        name: &str,
+        clip: &'b Motion,
+    ) -> Result<Cow<'b, Motion>, Failure> {
+        let root = &self.arguments.root;
+        if root.rule() == RootMotionRule::Keep {
+            return Ok(Cow::Borrowed(clip));
+        }
+        let engine = Engine::new(Device::Cpu).map_err(|error| Failure::evaluating(name, &error))?;
+        let samples = track_samples(clip, &engine);
+        let samples = samples.map_err(|error| Failure::evaluating(name, &error))?;
+        let treated = keys_with_root_motion(clip, &samples, &root.options(), root.rule());
+        treated
+            .map(Cow::Owned)
+            .map_err(|error| root.failure(name, &error))
+    }
+
     /// The motion of a robot in the layout of another program.
     fn robot(
         &mut self,
@@ -456,6 +485,7 @@ impl EvaluationJob<'_> {
         };
         self.check_interpolation(name, clip)?;
         self.check_scale(name, clip, false)?;
+        let clip = &*self.treated_keys(name, clip)?;
         let samples = self.clip_frames(clip, EndFrame::LeaveOut, name)?;
         self.left_out = samples.left_out;
         // Memory for the pose and the velocity of each body, and for the same in the result.
@@ -571,8 +601,12 @@ impl EvaluationJob<'_> {
         document: Option<&dyn Document>,
     ) -> Result<(EvaluatedResult, EvaluationReport), Failure> {
         self.note_frames(frames, target);
-        let mut all: Vec<Samples> = Vec::new();
+        let mut all: Vec<(Cow<'_, Motion>, Samples)> = Vec::new();
+        let root = &self.arguments.root;
         for (clip, samples) in clips.iter().zip(frames) {
+            if document.is_some() && root.rule() != RootMotionRule::Keep {
+                root.check_kept(name, clip)?;
+            }
             let frames = &samples.frames;
             let boxes = target.format().takes(FormatOption::BoxLength);
             self.check_scale(name, clip, boxes)?;
@@ -583,17 +617,23 @@ impl EvaluationJob<'_> {
             if samples.is_held() {
                 found.times = samples.written_times(clip, name)?.times(0).collect();
             }
-            all.push(found);
+            if root.rule() == RootMotionRule::Keep {
+                all.push((Cow::Borrowed(*clip), found));
+                continue;
+            }
+            let treated = with_root_motion(clip, &found, &root.options(), root.rule());
+            let (clip, found) = treated.map_err(|error| root.failure(name, &error))?;
+            all.push((Cow::Owned(clip), found));
         }
         let notes = self.notes(name)?;
-        let sampled: Vec<SampledClip<'_>> = (clips.iter().zip(&all).zip(frames))
+        let sampled: Vec<SampledClip<'_>> = (all.iter().zip(frames))
             .map(|((clip, samples), frames)| samples.of(clip, frames.rate, &notes))
             .collect();
         let indices = clips.iter().map(|clip| clip.index);
         let written = target.write_clips(&sampled, indices, document, &self.options(target))?;
-        let tracks = clips.iter().map(|clip| clip.set.track_count()).max();
-        let samples = all.iter().map(|samples| samples.times.len()).sum();
-        let times = || all.iter().flat_map(|samples| &samples.times).copied();
+        let tracks = all.iter().map(|(clip, _)| clip.set.track_count()).max();
+        let samples = all.iter().map(|(_, samples)| samples.times.len()).sum();
+        let times = || all.iter().flat_map(|(_, samples)| &samples.times).copied();
         let span = times().reduce(f64::min).zip(times().reduce(f64::max));
         let format = target.format();
         let writer = format

@@ -27,13 +27,14 @@ use crate::arguments::interpolation::{
 use crate::arguments::options::CommandLine;
 use crate::arguments::path::{PATHS, PathArguments};
 use crate::arguments::time::SamplingArguments;
+use crate::arguments::tracks::ScalarArguments;
 use crate::batch::entry::InputEntry;
 use crate::batch::target::{self, Destination};
 use crate::commands::plot::figure::Figure;
 use crate::commands::plot::source::curves::PlotSubject;
 use crate::commands::plot::source::{PlotSamples, PlotSource};
 use crate::commands::plot::subjects::{
-    ComponentSelector, PlotQuantity, Subjects, moving_boxes, together,
+    ComponentSelector, PlotQuantity, Subjects, changing_scalars, moving_boxes, together,
 };
 use crate::commands::travel::{self, Maker, is_path_file, is_travel};
 use crate::messages::drawn::{DrawnFile, note_scalars};
@@ -42,11 +43,11 @@ use crate::messages::progress::Progress;
 use crate::messages::{listing, names, words};
 use tumble_formats::sample::MethodChoice;
 
-/// Plot rotations (components, angular speed, error, an axis on a sphere) or bodies on paths, as SVG or PNG
+/// Plot rotations (components, angular speed, error, an axis on a sphere), scalars, or bodies on paths, as SVG or PNG
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Keys are drawn as dots, or as vertical lines where a curve has no value at a key. Tracks that never \
-turn are left out unless they are chosen (--tracks). For files of paths, the speed, \
+turn and scalars that never change are left out unless they are chosen (--tracks, --scalars). For files of paths, the speed, \
 the angular speed of the direction and the roll are drawn for each --path-frame.
 
 Examples:
@@ -54,6 +55,7 @@ Examples:
   tumble plot data/pendulum.dat --components 0.x,3.z -m slerp,c2 -o two.png
   tumble plot data/pendulum.dat --show speed -m slerp,catmull-rom,c2 -o speed.svg
   tumble plot data/pendulum.dat --show error --tracks 3 -m all -o error.svg
+  tumble plot lafan1/walk.csv --robot g1.xml --show scalars --scalars '*elbow' -o elbows.svg
   tumble plot data/*.dat -o pictures           a picture for each box of each input
   tumble plot road.csv --path-frame minimal,frenet -o road.svg
   tumble plot --report data/pendulum.dat data/pendulum-random.dat -o report")]
@@ -86,6 +88,8 @@ pub(crate) struct Arguments {
         conflicts_with = "tracks"
     )]
     components: Vec<ComponentSelector>,
+    #[command(flatten)]
+    scalars: ScalarArguments,
     /// Only this dimension, counted from 1: w x y z of the first track, then of the second …
     #[arg(
         long = "dimension",
@@ -108,7 +112,7 @@ pub(crate) struct Arguments {
     #[arg(long, value_enum, default_value = "-y", allow_hyphen_values = true)]
     axis: AxisArgument,
     /// Write a report: all plots, and an HTML page that shows them, into a directory
-    #[arg(long, conflicts_with_all = ["show", "components", "dimensions", "boxes", "tracks", "axis"])]
+    #[arg(long, conflicts_with_all = ["show", "components", "dimensions", "boxes", "tracks", "axis", "scalars"])]
     report: bool,
     /// The format of the results: svg or png [default: by the name of the output, else svg]
     #[arg(long, visible_alias = "to", alias = "picture-format", value_enum)]
@@ -227,12 +231,17 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
             return writer.draw(&figure, &file, path).and(rest);
         }
         let input::OnlyClip { clip, rest, .. } = arguments.inputs.load_one(path)?;
-        note_scalars(&name, &clip);
-        let tracks = arguments.inputs.tracks.of(&clip, &name)?;
         let choices = arguments.choices(&name, &clip)?;
         note_curves(&name, &clip, &choices);
         let source = PlotSource::new(names::title(path, &clip), &clip, &choices, &samples)?;
-        let subjects = arguments.subjects(&clip.set, tracks, &name)?;
+        let subjects = match arguments.show() {
+            PlotQuantity::Scalars => arguments.scalars(&clip, &name)?,
+            _ => {
+                note_scalars(&name, &clip);
+                let tracks = arguments.inputs.tracks.of(&clip, &name)?;
+                arguments.subjects(&clip.set, tracks, &name)?
+            }
+        };
         let pictures = match &writer.out {
             PlotOutput::One(_) => {
                 vec![(String::new(), together(&subjects, choices.len(), &name)?)]
@@ -302,6 +311,9 @@ impl Arguments {
 
     /// The methods that draw a clip, each differently.
     fn choices(&self, name: &str, clip: &Motion) -> Result<Vec<CurveChoice>, Failure> {
+        if self.show() == PlotQuantity::Scalars {
+            return CurveChoice::of_scalars(&self.methods(), self.interpolation, name);
+        }
         CurveChoice::of_clip(&self.methods(), self.interpolation, name, clip)
     }
 
@@ -331,6 +343,14 @@ impl Arguments {
                 ("dimensions", "--dimension"),
             ];
             line.refuse(&subjects, on, remedy)?;
+        }
+        if self.show == Some(PlotQuantity::Scalars) {
+            let remedy = "choose scalars by --scalars, or leave it out";
+            let tracks = [("tracks", "--tracks"), ("boxes", "--box")];
+            line.refuse(&tracks, "plots of scalars", remedy)?;
+        } else {
+            let remedy = "add --show scalars, or leave it out";
+            line.refuse(&[("scalars", "--scalars")], "this plot", remedy)?;
         }
         if self.show != Some(PlotQuantity::Sphere) {
             let remedy = "add --show sphere, or leave it out";
@@ -406,6 +426,25 @@ impl Arguments {
         Ok(PlotOutput::One(out.clone()))
     }
 
+    /// The scalars to draw of a clip.
+    fn scalars(&self, clip: &Motion, name: &str) -> Result<Subjects, Failure> {
+        if !self.dimensions.is_empty() || !self.components.is_empty() {
+            return Err(Failure::usage(COMPONENTS_ALONE));
+        }
+        if clip.set.scalar_count() == 0 {
+            return Err(Failure::usage(format!(
+                "{name}: has no scalars, such as the joints of a robot; leave out --show scalars"
+            )));
+        }
+        let chosen = self.scalars.of(clip, name)?;
+        Ok(Subjects {
+            boxes: chosen.unwrap_or_else(|| changing_scalars(clip, name)),
+            dimensions: Vec::new(),
+            show: PlotQuantity::Scalars,
+            axis: self.axis.into(),
+        })
+    }
+
     /// The subjects to draw of a set; refuses boxes and dimensions that do not exist.
     fn subjects(
         &self,
@@ -416,9 +455,7 @@ impl Arguments {
         let boxes = set.track_count();
         let is_of_components = !self.dimensions.is_empty() || !self.components.is_empty();
         if is_of_components && self.show() != PlotQuantity::Components {
-            return Err(Failure::usage(
-                "--components needs --show components; choose tracks for the others (--tracks)",
-            ));
+            return Err(Failure::usage(COMPONENTS_ALONE));
         }
         let there = format!(
             "{name} has {}, dimensions 1 to {} (w x y z of box 1, then of box 2 …)",
@@ -455,6 +492,8 @@ impl Arguments {
         })
     }
 }
+
+const COMPONENTS_ALONE: &str = "--components needs --show components; choose tracks or scalars for the others (--tracks, --scalars)";
 
 /// Draws figures into files.
 pub(crate) struct FigureWriter {

@@ -3,7 +3,7 @@
 pub(crate) mod curves;
 
 use glam::Quat;
-use tumble::{Interpolation, Layout, SampleTimes, Timeline, TrackSet, Vectors};
+use tumble::{Interpolation, Layout, SampleTimes, ScalarQuantity, Timeline, TrackSet, Vectors};
 use tumble_formats::motion::Motion;
 use tumble_formats::outside::Outside;
 
@@ -156,6 +156,26 @@ impl<'a> PlotSource<'a> {
         device
             .collect(&one, interpolation, &self.frames, Layout::TrackMajor)
             .map_err(|error| Failure::evaluating(&self.name, &error))
+    }
+
+    /// The samples of one scalar, without its origin.
+    pub(crate) fn scalar_samples(
+        &self,
+        device: &mut OpenedDevice,
+        index: usize,
+        choice: CurveChoice,
+    ) -> Result<Vec<f64>, Failure> {
+        let mut one = Motion::default();
+        if let Some(keys) = self.set.scalar(index) {
+            let added = one.push_scalar(self.clip.scalar(index), keys);
+            added.map_err(|error| Failure::evaluating(&self.name, &error.into()))?;
+        }
+        let methods = choice.channel_methods();
+        let found = device.choose(self.timeline.len()).and_then(|()| {
+            device.work(|engine| methods.scalars(engine, &one, &self.frames, ScalarQuantity::Value))
+        });
+        let found = found.map_err(|error| Failure::evaluating(&self.name, &error))?;
+        Ok(found.into_iter().map(f64::from).collect())
     }
 
     /// The velocities or accelerations of one box.

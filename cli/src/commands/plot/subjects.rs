@@ -5,8 +5,9 @@ use std::str::FromStr;
 use clap::ValueEnum;
 use glam::{DVec3, Quat, Vec3};
 use tumble::{Track, TrackSet};
+use tumble_formats::motion::Motion;
 
-use crate::commands::plot::source::curves::{PlotSubject, box_name};
+use crate::commands::plot::source::curves::{PlotSubject, box_name, scalar_name};
 use crate::messages::exit::Failure;
 use crate::messages::words;
 
@@ -24,6 +25,8 @@ pub(super) enum PlotQuantity {
     Error,
     /// the path of an axis of a box on the sphere
     Sphere,
+    /// angles of joints, weights of morph targets, contacts and other numbers over time
+    Scalars,
     /// of bodies on paths: speed, turning rate of the direction, and the turn about it
     Path,
 }
@@ -72,6 +75,7 @@ impl ComponentSelector {
 
 /// The tracks and the quantity that are drawn of one set, and how they are divided among several pictures.
 pub(super) struct Subjects {
+    /// Tracks; with [`PlotQuantity::Scalars`] scalars.
     pub(super) boxes: Vec<usize>,
     pub(super) dimensions: Vec<usize>,
     pub(super) show: PlotQuantity,
@@ -85,6 +89,7 @@ impl Subjects {
             PlotQuantity::Speed => PlotSubject::Speed(boxes),
             PlotQuantity::Error => PlotSubject::Error(boxes),
             PlotQuantity::Sphere | PlotQuantity::Path => PlotSubject::Sphere(boxes, self.axis),
+            PlotQuantity::Scalars => PlotSubject::Scalars(boxes),
         }
     }
 
@@ -112,7 +117,11 @@ impl Subjects {
         };
         let show = self.show.to_possible_value();
         let show = show.as_ref().map_or("", |value| value.get_name());
-        let one = |&index: &usize| (format!("{show}-box-{}", index + 1), self.of(vec![index]));
+        let label = |number: usize| match self.show {
+            PlotQuantity::Scalars => format!("scalar-{number}"),
+            _ => format!("{show}-box-{number}"),
+        };
+        let one = |&index: &usize| (label(index + 1), self.of(vec![index]));
         if self.dimensions.is_empty() {
             self.boxes.iter().map(one).collect()
         } else {
@@ -154,6 +163,41 @@ pub(super) fn moving_boxes(set: &TrackSet, name: &str) -> Vec<usize> {
     moving
 }
 
+/// The scalars of a clip that are drawn if none are chosen: those that change, or all if none does. A note names the
+/// others.
+pub(super) fn changing_scalars(clip: &Motion, name: &str) -> Vec<usize> {
+    let all = 0..clip.set.scalar_count();
+    let (still, changing): (Vec<usize>, Vec<usize>) = all.partition(|&index| {
+        let keys = clip.set.scalar(index);
+        keys.is_none_or(|keys| {
+            let is_flat = keys
+                .tangents
+                .as_flattened()
+                .iter()
+                .all(|&slope| slope == 0.0);
+            keys.keys.iter().all(|&key| key == keys.keys[0]) && is_flat
+        })
+    });
+    if changing.is_empty() {
+        return still;
+    }
+    if !still.is_empty() {
+        let names: Vec<String> = still
+            .iter()
+            .map(|&index| scalar_name(clip, index))
+            .collect();
+        let (subject, object) = match still.len() {
+            1 => ("it does", "it"),
+            _ => ("they do", "them"),
+        };
+        words::note(&format!(
+            "{name}: not drawn, {subject} not change: {}; --scalars draws {object}",
+            names.join(", ")
+        ));
+    }
+    changing
+}
+
 /// Everything in one picture, if that can be read.
 pub(super) fn together(
     subjects: &Subjects,
@@ -164,7 +208,7 @@ pub(super) fn together(
     if panels > PANELS {
         return Err(Failure::usage(format!(
             "{name}: {panels} panels in one picture cannot be read, at most {PANELS}; choose \
-             some (--tracks, --components), or give a directory, for a picture each"
+             some (--tracks, --components, --scalars), or give a directory, for a picture each"
         )));
     }
     Ok(subjects.one())

@@ -57,6 +57,7 @@ pub(crate) struct Proof {
     pub(crate) negative_control: NegativeControl,
     pub(crate) golden: GoldenSection,
     pub(crate) random: RandomSection,
+    pub(crate) scalars: ScalarSection,
     pub(crate) renderer: Option<RendererReport>,
     /// Where it was asked for.
     pub(crate) validation: Option<ValidationSection>,
@@ -229,6 +230,28 @@ impl RandomSection {
     }
 }
 
+/// Random scalars by every method and quantity.
+#[derive(Debug, Default, Serialize)]
+pub(crate) struct ScalarSection {
+    pub(crate) values: u64,
+    pub(crate) values_differing: u64,
+    /// The index of the first value that differs.
+    pub(crate) first_difference: Option<usize>,
+    /// The hash of the CPU's result: the same on every machine.
+    pub(crate) digest: String,
+}
+
+impl From<RandomRound> for ScalarSection {
+    fn from(found: RandomRound) -> Self {
+        Self {
+            values: found.values,
+            values_differing: found.differing,
+            first_difference: found.first_difference,
+            digest: hexadecimal(&found.hash[..8]),
+        }
+    }
+}
+
 /// A hash of the first rounds.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub(crate) struct RoundsDigest {
@@ -313,6 +336,18 @@ impl Proof {
                 "{values_differing} of {values} random values differ, the first: {first}"
             ));
         }
+        if self.scalars.values_differing > 0 {
+            let ScalarSection {
+                values,
+                values_differing,
+                first_difference,
+                ..
+            } = self.scalars;
+            let first = first_difference.unwrap_or_default();
+            reasons.push(format!(
+                "{values_differing} of {values} scalars differ, the first at {first}"
+            ));
+        }
         let checks = self.renderer.iter().flat_map(|renderer| &renderer.checks);
         for check in checks.filter(|check| check.differing > 0) {
             let RendererCheck {
@@ -387,6 +422,10 @@ impl Proof {
         unless(
             self.random.crowds > 0,
             "no random crowd was compared".to_owned(),
+        );
+        unless(
+            self.scalars.values >= 1 << 20,
+            format!("{} scalars were compared, not 2^20", self.scalars.values),
         );
         let renderer_values = self.renderer.iter().flat_map(|renderer| &renderer.checks);
         unless(

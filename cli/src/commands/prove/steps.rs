@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use tumble::verify::figures::figures_with;
 use tumble::verify::golden::Golden;
-use tumble::verify::random::round;
+use tumble::verify::random::{round, scalars_round};
 use tumble::verify::renderer::renderer;
 use tumble::vulkan::VulkanDevice;
 use tumble::vulkan::tuning::{Mapping, PrepareArcs, ReadBack, Reads, RunLanes, Transfer, Uploads};
@@ -15,7 +15,7 @@ use tumble::{Device, Engine, EngineOptions};
 use crate::commands::prove::report::{
     CompileTimes, DeviceSection, DifferingValues, FORMAT, FORMAT_VERSION, GoldenSection,
     GoldenSetting, KernelSection, MAX_DESCRIBED, NegativeControl, Proof, RandomSection,
-    ValidationSection, Verdict,
+    ScalarSection, ValidationSection, Verdict,
 };
 use crate::commands::prove::{compile, device};
 use crate::messages::words;
@@ -215,6 +215,7 @@ fn empty(options: &ProofOptions, vulkan: &VulkanDevice) -> Proof {
             seed: options.seed,
             ..RandomSection::default()
         },
+        scalars: ScalarSection::default(),
         renderer: None,
         validation: options.validate.then(ValidationSection::default),
         compile_times: CompileTimes::default(),
@@ -234,6 +235,7 @@ impl ProofRun<'_> {
         self.step("recorded results", Self::recorded_once);
         self.step("a renderer's device", Self::renderer);
         self.step("random sets and crowds", Self::random_once);
+        self.step("random scalars", Self::scalars);
         self.step_if_time("compiling", COMPILED_BY, Self::compile);
         self.step_if_time("speed", MEASURED_BY, Self::measure);
         if self.options.validate {
@@ -501,6 +503,12 @@ impl ProofRun<'_> {
             }
             self.proof.random.add(&found);
         }
+        Ok(())
+    }
+
+    fn scalars(&mut self) -> Result<(), StepError> {
+        let engine = &self.engines[0];
+        self.proof.scalars = scalars_round(engine, &self.cpu, self.options.seed)?.into();
         Ok(())
     }
 

@@ -170,6 +170,13 @@ fn bits(proof: &Proof, text: &mut String) {
         grouped(random.values),
         random.values_differing
     );
+    let scalars = &proof.scalars;
+    let _ = writeln!(
+        text,
+        "  scalars           {} values by every method, {} differ",
+        grouped(scalars.values),
+        scalars.values_differing
+    );
     match &proof.renderer {
         None => text.push_str("  renderer          did not run\n"),
         Some(renderer) => {
@@ -284,7 +291,7 @@ fn verdict(proof: &Proof, text: &mut String) {
     let _ = writeln!(text, "\n{seconds:.0} s of {allowed} s");
     let checks = proof.renderer.iter().flat_map(|renderer| &renderer.checks);
     let on_renderer: u64 = checks.map(|check| check.values).sum();
-    let values = proof.random.values + proof.kernels.values + on_renderer;
+    let values = proof.random.values + proof.scalars.values + proof.kernels.values + on_renderer;
     let _ = match proof.verdict {
         Verdict::Proved => writeln!(
             text,

@@ -111,8 +111,8 @@ impl<'a> GltfReader<'a> {
         self.json.entry("accessors", index, from)
     }
 
-    /// The numbers of an accessor whose elements have `width` components, one element after another; `from` is the
-    /// JSON pointer of the value that names it.
+    /// The numbers of an accessor whose elements have `width` components, one element after another: floats or
+    /// normalized integers. `from` is the JSON pointer of the value that names it.
     ///
     /// # Errors
     /// When the accessor is of another type, when its bytes are missing, or when its sparse indices are out of range.
@@ -123,9 +123,32 @@ impl<'a> GltfReader<'a> {
         width: usize,
         from: &str,
     ) -> Result<Vec<f64>, Diagnostic> {
+        self.numbers_of(index, accessor, (width, true), from)
+    }
+
+    /// The times of an accessor, which are floats.
+    ///
+    /// # Errors
+    /// As [`GltfReader::numbers`].
+    pub(in crate::gltf) fn times(
+        &self,
+        index: usize,
+        accessor: &Accessor,
+        from: &str,
+    ) -> Result<Vec<f64>, Diagnostic> {
+        self.numbers_of(index, accessor, (1, false), from)
+    }
+
+    fn numbers_of(
+        &self,
+        index: usize,
+        accessor: &Accessor,
+        (width, takes_fractions): (usize, bool),
+        from: &str,
+    ) -> Result<Vec<f64>, Diagnostic> {
         let kind = kind(width);
         let component = ComponentType::of(accessor.component_type).filter(|component| {
-            let is_fraction = accessor.normalized && component.size() < 4 && width > 1;
+            let is_fraction = accessor.normalized && component.size() < 4 && takes_fractions;
             *component == ComponentType::F32 || is_fraction
         });
         let Some(component) = component.filter(|_| accessor.kind == kind) else {
@@ -134,7 +157,7 @@ impl<'a> GltfReader<'a> {
             } else {
                 ""
             };
-            let or = if width > 1 {
+            let or = if takes_fractions {
                 " or normalized integers"
             } else {
                 ""

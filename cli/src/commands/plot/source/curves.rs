@@ -4,6 +4,7 @@ use glam::{DVec3, Quat, Vec3};
 use tumble::reference::{ReferenceCurve, angle_between};
 use tumble::verify::error_bound;
 use tumble::{Axes, Interpolation, Quantity, TrackSet};
+use tumble_formats::motion::{Motion, ScalarKind};
 use tumble_formats::printable::printable;
 
 use crate::arguments::device::OpenedDevice;
@@ -35,6 +36,8 @@ pub(crate) enum PlotSubject {
     Error(Vec<usize>),
     /// Where an axis of a box points, seen from its parent.
     Sphere(Vec<usize>, Vec3),
+    /// Scalars of the clip.
+    Scalars(Vec<usize>),
 }
 
 impl PlotSource<'_> {
@@ -77,6 +80,10 @@ impl PlotSource<'_> {
                     false => "where an axis of each joint points, seen from its parent",
                 };
                 (quantity, panels)
+            }
+            PlotSubject::Scalars(scalars) => {
+                let panel = |&index| self.scalar(device, index);
+                ("scalars", scalars.iter().map(panel).collect())
             }
         };
         let panels = panels?;
@@ -138,11 +145,15 @@ impl PlotSource<'_> {
         legend
     }
 
-    /// The name of a box, of which a panel has room for the end alone if it is long: the end tells joints apart.
+    /// The name of a box.
     fn box_name(&self, index: usize) -> String {
+        Self::title(box_name(self.set, index))
+    }
+
+    /// A name, of which a panel has room for the end alone if it is long: the end tells joints apart.
+    fn title(name: String) -> String {
         /// Characters for which a panel has room.
         const LONGEST: usize = 44;
-        let name = box_name(self.set, index);
         match name.chars().count().checked_sub(LONGEST) {
             Some(over @ 1..) => format!("…{}", name.chars().skip(over + 1).collect::<String>()),
             _ => name,
@@ -206,6 +217,45 @@ impl PlotSource<'_> {
             }
         };
         Ok(self.panel(title, label, range, curves, dots))
+    }
+
+    /// A scalar over time, with its unit where that is known.
+    fn scalar(&self, device: &mut OpenedDevice, index: usize) -> Result<Panel, Failure> {
+        let scalar = self.clip.scalar(index);
+        let mut curves = Vec::new();
+        for (order, &choice) in self.choices.iter().enumerate() {
+            let samples = self.scalar_samples(device, index, choice)?;
+            let values = samples.into_iter().map(|value| value + scalar.origin);
+            curves.push(PlotCurve {
+                colour: colours::of_choice(choice.method),
+                width: self.width(order),
+                opacity: 1.0,
+                pieces: vec![thinned(&self.points(values), 2000)],
+            });
+        }
+        let (keys, range) = (self.clip.set.scalar(index), &self.x.axis.range);
+        let placed = keys
+            .into_iter()
+            .flat_map(|keys| keys.times.iter().zip(keys.keys));
+        let placed =
+            placed.map(|(&time, &key)| (time - self.x.origin, f64::from(key) + scalar.origin));
+        let dots = Dots {
+            colour: INK,
+            opacity: 1.0,
+            points: placed.filter(|(x, _)| range.contains(x)).collect(),
+        };
+        let shown = curves
+            .iter()
+            .flat_map(|curve| curve.pieces.iter().flatten());
+        let range = range_of(shown.chain(&dots.points).map(|point| point.1));
+        let label = match scalar.kind {
+            ScalarKind::Angle => "angle, rad",
+            ScalarKind::Length => "length",
+            ScalarKind::Contact => "contact",
+            ScalarKind::Plain => "value",
+        };
+        let title = Self::title(scalar_name(self.clip, index));
+        Ok(self.panel(title, label, range, curves, vec![dots]))
     }
 
     /// Where curves may lie on each other, those drawn first are broader.
@@ -362,6 +412,14 @@ pub(crate) fn box_name(set: &TrackSet, index: usize) -> String {
     match set.track(index).name.filter(|name| !name.is_empty()) {
         Some(name) => printable(name).into_owned(),
         None => format!("box {}", index + 1),
+    }
+}
+
+/// The name of a scalar; `scalar 1` where it has none.
+pub(crate) fn scalar_name(clip: &Motion, index: usize) -> String {
+    match clip.set.scalar(index).map_or("", |keys| keys.name) {
+        "" => format!("scalar {}", index + 1),
+        name => printable(name).into_owned(),
     }
 }
 

@@ -66,6 +66,10 @@ fn whole() -> Option<Proof> {
             values: 100,
             ..RandomSection::default()
         },
+        scalars: ScalarSection {
+            values: 1 << 20,
+            ..ScalarSection::default()
+        },
         renderer: Some(RendererReport {
             checks: vec![RendererCheck {
                 name: "buffer to buffer".to_owned(),
@@ -140,6 +144,9 @@ fn what_did_not_run_or_was_not_compared_is_not_proved() {
             }),
             ("no random set", |proof| proof.random.values = 0),
             ("no random crowd", |proof| proof.random.crowds = 0),
+            ("7 scalars were compared, not 2^20", |proof| {
+                proof.scalars.values = 7;
+            }),
             ("on a renderer's device", |proof| proof.renderer = None),
             ("under the validation layer", |proof| {
                 proof.validation = Some(ValidationSection::default());
@@ -174,6 +181,10 @@ fn a_bit_that_differs_anywhere_is_told_before_all_else() {
             }),
             ("1 recorded results differ, the first: slerp", |proof| {
                 proof.golden.differing.push("slerp".to_owned());
+            }),
+            ("2 of 1048576 scalars differ, the first at 9", |proof| {
+                proof.scalars.values_differing = 2;
+                proof.scalars.first_difference = Some(9);
             }),
             ("3 of 100 random values differ", |proof| {
                 proof.random.values_differing = 3;

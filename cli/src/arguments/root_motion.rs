@@ -1,0 +1,115 @@
+//! The options for the motion of a root over the ground.
+
+use clap::Args;
+use clap::builder::TypedValueParser;
+use tumble_formats::learning::{Ground, HeadingSource};
+use tumble_formats::motion::Motion;
+use tumble_formats::root_motion::{RootMotionOptions, RootMotionRule, root_joint};
+
+use crate::arguments::options::CommandLine;
+use crate::arguments::output::one_of;
+use crate::messages::exit::{ALL_INPUTS, Failure};
+
+/// The axis that points up in a motion.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct VerticalArguments {
+    /// The axis that points up, for headings, contacts and root motion
+    #[arg(long, value_name = "AXIS", default_value = "y", value_parser = vertical())]
+    pub(crate) vertical: Ground,
+}
+
+/// How a root moves in results.
+#[derive(Debug, Clone, Args)]
+#[command(next_help_heading = "Root motion")]
+pub(crate) struct RootMotionArguments {
+    /// The motion of the root over the ground: its translation there, and its heading
+    #[arg(long, value_name = "RULE", default_value_t, value_parser = rule())]
+    root_motion: RootMotionRule,
+    /// The heading of the root
+    #[arg(long, value_name = "HEADING", requires = "root_motion", default_value_t, value_parser = heading())]
+    heading: HeadingSource,
+    /// The joint that is the root [default: the one that moves, and whose ancestors do not]
+    #[arg(long, value_name = "NAME", requires = "root_motion")]
+    root_joint: Option<String>,
+    #[command(flatten)]
+    vertical: VerticalArguments,
+}
+
+fn vertical() -> impl TypedValueParser<Value = Ground> {
+    let help = |axis| match axis {
+        Ground::Y => "as in glTF, BVH and HumanML3D",
+        Ground::Z => "as robots have it",
+    };
+    one_of(Ground::ALL.map(|axis| (axis.name(), help(axis), axis)))
+}
+
+fn rule() -> impl TypedValueParser<Value = RootMotionRule> {
+    let help = |rule| match rule {
+        RootMotionRule::Keep => "the root has it",
+        RootMotionRule::InPlace => {
+            "left out: the root stays above the origin and faces one direction"
+        }
+        RootMotionRule::Extract => "a new joint, root_motion, has it and carries the root",
+    };
+    one_of(RootMotionRule::ALL.map(|rule| (rule.name(), help(rule), rule)))
+}
+
+fn heading() -> impl TypedValueParser<Value = HeadingSource> {
+    let help = |source| match source {
+        HeadingSource::Twist => "its twist about the axis that points up",
+        HeadingSource::X => "the direction of its x axis on the ground",
+        HeadingSource::Y => "that of its y axis",
+        HeadingSource::Z => "that of its z axis",
+    };
+    one_of(HeadingSource::ALL.map(|source| (source.name(), help(source), source)))
+}
+
+impl RootMotionArguments {
+    pub(crate) fn rule(&self) -> RootMotionRule {
+        self.root_motion
+    }
+
+    pub(crate) fn options(&self) -> RootMotionOptions {
+        RootMotionOptions {
+            ground: self.vertical.vertical,
+            heading: self.heading,
+            joint: self.root_joint.clone(),
+        }
+    }
+
+    /// Refuses options that say how root motion is found, where it is not.
+    pub(crate) fn check(&self, line: &CommandLine) -> Result<(), Failure> {
+        if self.root_motion != RootMotionRule::Keep {
+            return Ok(());
+        }
+        let all = [
+            ("vertical", "--vertical"),
+            ("heading", "--heading"),
+            ("root_joint", "--root-joint"),
+        ];
+        let remedy = "add --root-motion in-place or extract, or leave it out";
+        line.refuse(&all, "roots that keep their motion", remedy)
+    }
+
+    /// Refuses a file that is written again, whose root would need channels that it does not have.
+    pub(crate) fn check_kept(&self, name: &str, clip: &Motion) -> Result<(), Failure> {
+        let root = root_joint(clip, &self.options());
+        let root = root.map_err(|error| self.failure(name, &error))?;
+        if clip.root_has_keys(root) {
+            return Ok(());
+        }
+        let joint = clip.set.track_name(root);
+        Err(Failure::usage(format!(
+            "{name}: `{joint}` has no keys of its rotation, or steps, or is far from 0, and a file that is kept gets no \
+             new channels; write another format"
+        )))
+    }
+
+    /// The failure of an input, by its name.
+    pub(crate) fn failure(&self, name: &str, error: &dyn std::fmt::Display) -> Failure {
+        Failure::new(
+            ALL_INPUTS,
+            format!("{name}: --root-motion {}: {error}", self.root_motion),
+        )
+    }
+}
