@@ -421,13 +421,15 @@ impl Goal {
     fn instructions(&self, listing: &Listing, samples: usize) -> usize {
         const LANES: usize = 8;
         const IDLE: usize = LANES / 2;
+        const CUT: usize = 32 * LANES;
         let mut all = 0;
-        for done in (0..samples).step_by(16 * LANES) {
-            let end = IDLE + (samples - done).min(16 * LANES);
+        for done in (0..samples).step_by(CUT) {
+            let end = IDLE + (samples - done).min(CUT);
             let iterations = end.div_ceil(LANES);
             if self.parts > 1 {
-                // The first and the last iteration of a run ask for each part.
-                all += listing.usual(&|_| iterations) + 2 * self.parts * listing.storing_loop();
+                // The first and the last iteration of a run ask for each part, by a loop that stores one.
+                let trips = |stores| if stores > 1 { iterations } else { self.parts };
+                all += listing.usual(&trips) + 2 * self.parts * listing.storing_loop();
                 continue;
             }
             // As `spread/alone.wgsl` divides the iterations behind the first one.
