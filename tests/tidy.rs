@@ -211,6 +211,7 @@ fn every_shader_function_has_its_twin() {
                 "whole",
                 "whole_rotations",
                 "whole_matrices",
+                "subgroup_rotations",
                 "self_test",
                 "link",
                 "workgroup",

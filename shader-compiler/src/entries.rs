@@ -4,7 +4,7 @@
 //!
 //! They are written for clarity, not for speed, and share no arithmetic with [`crate::functions`]. A function is
 //! generic over a `Machine`, which has the memory and says what a number of f32 is. Functions that reach a barrier are
-//! `async`: they yield there until the whole workgroup has arrived.
+//! `async`: they yield there until the whole workgroup has arrived; so are those that ask the other lanes of a subgroup.
 //!
 //! Kernels are joined from files that they share. A function is written once for all kernels in which it is the same;
 //! one that is another in some kernels gets a function that asks the machine which kernel runs.
@@ -14,7 +14,7 @@ use std::fmt::Write as _;
 
 use naga::valid::{FunctionInfo, ModuleInfo};
 use naga::{
-    AddressSpace, ArraySize, BinaryOperator, Binding, Block, BuiltIn, Expression, Function, Handle,
+    AddressSpace, ArraySize, BinaryOperator, Binding, Block, BuiltIn, Expression, Function, GatherMode, Handle,
     Literal, LocalVariable, MathFunction, Module, ScalarKind, Span, Statement, Type, TypeInner,
     UnaryOperator,
 };
@@ -106,7 +106,7 @@ pub(crate) fn rust(kernels: &[Source<'_>]) -> String {
          those.\n\n\
          use crate::shader::*;\n\
          use crate::twin::machine::{\
-         Entry, Float, Machine, barrier, both, choose, quotient, stored};\n\n",
+         Entry, Float, Machine, ballot, barrier, both, choose, quotient, shuffled, stored};\n\n",
     );
     text += &globals(kernels);
     for (name, declaration) in structs {
@@ -304,7 +304,7 @@ impl Names {
                 of.insert(signature);
             }
         }
-        // A function waits if it has a barrier, or calls one that waits.
+        // A function waits if it has a barrier, asks the other lanes of its subgroup, or calls one that waits.
         loop {
             let before = names.waits.len();
             for kernel in kernels {
@@ -326,7 +326,9 @@ impl Names {
 
     fn block_waits(&self, types: &Types<'_>, block: &Block) -> bool {
         block.iter().any(|statement| match statement {
-            Statement::ControlBarrier(_) => true,
+            Statement::ControlBarrier(_)
+            | Statement::SubgroupBallot { .. }
+            | Statement::SubgroupGather { .. } => true,
             Statement::Block(inner) => self.block_waits(types, inner),
             Statement::If { accept, reject, .. } => {
                 self.block_waits(types, accept) || self.block_waits(types, reject)
@@ -523,6 +525,9 @@ impl<'a> Writer<'a> {
                     BuiltIn::WorkGroupId => "workgroup_id",
                     BuiltIn::NumWorkGroups => "num_workgroups",
                     BuiltIn::LocalInvocationIndex => "local_invocation_index",
+                    BuiltIn::SubgroupId => "subgroup_id",
+                    BuiltIn::NumSubgroups => "num_subgroups",
+                    BuiltIn::SubgroupInvocationId => "subgroup_invocation_id",
                     other => return Err(format!("argument {i}: {other:?}")),
                 };
                 writeln!(start, "let {name} = machine.ids().{of};").unwrap();
@@ -664,6 +669,25 @@ impl<'a> Writer<'a> {
                     steps += 1;
                 }
                 Statement::ControlBarrier(_) => self.line("barrier().await;"),
+                Statement::SubgroupBallot { result, predicate } => {
+                    let predicate = match predicate {
+                        Some(predicate) => self.value(*predicate)?.text,
+                        None => "true".to_owned(),
+                    };
+                    let text = format!("ballot(machine, {predicate}).await");
+                    self.bind(*result, "ballot", &text);
+                    steps += 1;
+                }
+                Statement::SubgroupGather {
+                    mode: GatherMode::Shuffle(lane),
+                    argument,
+                    result,
+                } => {
+                    let (value, lane) = (self.value(*argument)?.text, self.value(*lane)?.text);
+                    let text = format!("shuffled(machine, {value}, {lane}).await");
+                    self.bind(*result, "shuffled_value", &text);
+                    steps += 1;
+                }
                 other => return Err(format!("{other:?}")),
             }
         }

@@ -46,7 +46,7 @@ const F_CONVERT: u16 = 115;
 const VECTOR_TIMES_SCALAR: u16 = 142;
 /// Float arithmetic with a looser bound, conversions that round freely, and what [`splat_products`]
 /// leaves nothing of.
-const INEXACT: [u16; 18] = [
+const INEXACT: [u16; 20] = [
     109,
     110,
     115,
@@ -65,6 +65,8 @@ const INEXACT: [u16; 18] = [
     208,
     209,
     215, // DPdx DPdy Fwidth and relatives
+    350,
+    352, // GroupNonUniformFAdd, FMul: in any order
 ];
 
 /// Why the pass refuses a module.

@@ -26,6 +26,7 @@ use std::path::Path;
 
 use naga::back::spv;
 use naga::front::wgsl::{Frontend, Options};
+use naga::{Binding, BuiltIn};
 use naga::valid::{Capabilities, GlobalUse, ModuleInfo, ValidationFlags, Validator};
 
 use entries::Source;
@@ -82,6 +83,7 @@ fn compile() -> Files {
         };
         compiled.push(Compiled {
             bindings: storage.bindings(),
+            subgroups: storage.asks_subgroups(),
             words: emit(&storage),
             texel_words: texels.as_ref().map(&mut emit),
             converting_words: converting.as_ref().map(emit),
@@ -253,8 +255,10 @@ impl Module {
         let parsed = Frontend::new_with_options(options)
             .parse(&source)
             .unwrap_or_else(|error| panic!("{name}: {}", error.emit_to_string(&source)));
-        let capabilities =
-            Capabilities::IMMEDIATES | Capabilities::SHADER_INT64 | Capabilities::SHADER_FLOAT16;
+        let capabilities = Capabilities::IMMEDIATES
+            | Capabilities::SHADER_INT64
+            | Capabilities::SHADER_FLOAT16
+            | Capabilities::SUBGROUP;
         let info = Validator::new(ValidationFlags::all(), capabilities)
             .validate(&parsed)
             .unwrap_or_else(|error| panic!("{name}: {}", error.emit_to_string(&source)));
@@ -283,6 +287,13 @@ impl Module {
         });
         let bound: BTreeMap<_, _> = bound.collect();
         bound.into_values().collect()
+    }
+
+    /// Whether the lanes of its subgroups ask each other.
+    fn asks_subgroups(&self) -> bool {
+        let mut arguments = self.parsed.entry_points[0].function.arguments.iter();
+        let lane = Some(Binding::BuiltIn(BuiltIn::SubgroupInvocationId));
+        arguments.any(|argument| argument.binding == lane)
     }
 
     /// Its SPIR-V, which rounds as it is written.

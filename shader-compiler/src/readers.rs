@@ -141,15 +141,21 @@ fn reader(read: &Read, module: &Module, load: impl Fn(&str) -> String) -> String
             scalars(&["head.x", "head.y", "head.z", "head.w", "tail.x", "tail.y"])
         ),
         16 if fields.len() == 4 => {
-            let Field::Scalar(kind) = fields[0] else {
-                panic!("{buffer}: four fields of four bytes are scalars");
+            let all = ["all.x", "all.y", "all.z", "all.w"];
+            let kind_of = |field: &Field| match *field {
+                Field::Scalar(kind) => kind,
+                _ => panic!("{buffer}: four fields of four bytes are scalars"),
             };
-            let words = vector(kind, load("index"));
-            let (element, all) = (read.element, ["all.x", "all.y", "all.z", "all.w"]);
-            format!(
-                "let all = {words};\nreturn {element}({});\n",
-                all.join(", ")
-            )
+            let kind = kind_of(&fields[0]);
+            match fields.iter().all(|field| kind_of(field) == kind) {
+                true => format!(
+                    "let all = {};\nreturn {}({});\n",
+                    vector(kind, load("index")),
+                    read.element,
+                    all.join(", ")
+                ),
+                false => format!("let all = {};\nreturn {};\n", load("index"), scalars(&all)),
+            }
         }
         16 if fields.len() == 1 => match fields[0] {
             Field::Vector(kind) => format!("return {};\n", vector(kind, load("index"))),

@@ -227,6 +227,8 @@ pub(crate) struct Compiled {
     pub(crate) texel_words: Option<usize>,
     /// Those of the variant that converts to half precision.
     pub(crate) converting_words: Option<usize>,
+    /// Whether the lanes of its subgroups ask each other.
+    pub(crate) subgroups: bool,
 }
 
 /// The kernels as Rust: an enum of their names, their code, and the choice of a kernel by form,
@@ -293,6 +295,7 @@ pub(crate) fn kernels(all: &[Compiled]) -> String {
             words,
             texel_words,
             converting_words,
+            subgroups,
         } = kernel;
         let texels = texel_words.map(|words| (format!("{name}_texels"), words));
         let converting = converting_words.map(|words| (format!("{name}_converting"), words));
@@ -303,7 +306,7 @@ pub(crate) fn kernels(all: &[Compiled]) -> String {
             text,
             "    KernelCode {{ kernel: Kernel::{}, storage: ({name:?}, {words}), texels: {texels:?}, \
              converting: {converting:?}, \
-             bindings: &[{}], segments: {segments} }},",
+             bindings: &[{}], segments: {segments}, subgroups: {subgroups} }},",
             variant(name),
             bindings.join(", ")
         )

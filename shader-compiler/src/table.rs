@@ -255,11 +255,12 @@ const CHANNELS: [&str; 9] = [
 ];
 
 /// The same where it is simple.
-const PLAIN_CHANNELS: [&str; 6] = [
+const PLAIN_CHANNELS: [&str; 7] = [
     "math/canonical",
     "math/sine_cosine",
     "forms/evaluate_arc",
     "crowd/entry",
+    "crowd/plain_arc",
     "crowd/cubic",
     "crowd/plain",
 ];
@@ -309,6 +310,7 @@ const CROWD: [(&str, &[&str]); 7] = [
             "crowd/time_tables",
             "crowd/time_buffers",
             "crowd/ticks",
+            "crowd/span_search",
             "crowd/times",
             "crowd",
         ],
@@ -351,11 +353,12 @@ const CROWD: [(&str, &[&str]); 7] = [
 ];
 
 /// The files that kernels over whole instances share: they find positions, and store in either precision.
-const WHOLE: [&str; 7] = [
+const WHOLE: [&str; 8] = [
     "crowd/workgroup",
     "lists/frame_distance",
     "crowd/time_tables",
     "crowd/ticks",
+    "crowd/span_search",
     "math/half",
     "crowd/any_half",
     "crowd/whole",
@@ -385,6 +388,31 @@ const CROWD_WHOLE: [(&str, &[&[&str]]); 4] = [
         &[&CHANNELS, &["crowd/layers"], &WHOLE_MATRICES],
     ),
     ("plain_whole_matrices", &[&PLAIN_CHANNELS, &WHOLE_MATRICES]),
+];
+
+/// The kernel over whole instances for cards whose subgroups vote and shuffle: its files.
+const CROWD_SUBGROUPS: [&str; 11] = [
+    "crowd/workgroup",
+    "math/canonical",
+    "math/sine_cosine",
+    "forms/evaluate_arc",
+    "lists/frame_distance",
+    "crowd/entry",
+    "crowd/plain_arc",
+    "crowd/time_tables",
+    "crowd/ticks",
+    "stores/f32",
+    "crowd/subgroup_rotations",
+];
+
+/// The buffers that it reads.
+static WHOLE_READS: [Read; 6] = [
+    read("entries", "CrowdEntry", "entry_at"),
+    read("clips", "CrowdClip", "clip_at"),
+    read("time_bases", "CrowdBase", "base_at"),
+    read("spans", "CrowdSpan", "span_of"),
+    read("channels", "CrowdChannel", "channel_at"),
+    read("cells", "vec4f", "cell_at"),
 ];
 
 /// The files of the self-test.
@@ -500,6 +528,15 @@ pub(crate) fn kernels() -> Vec<Kernel> {
             converts: false,
         });
     }
+    kernels.push(Kernel {
+        name: "crowd_subgroup_rotations".to_owned(),
+        files: CROWD_SUBGROUPS.to_vec(),
+        reads: WHOLE_READS.iter().collect(),
+        has_texels: false,
+        loads_vectors: true,
+        streams_results: false,
+        converts: false,
+    });
     kernels.push(Kernel {
         name: "prepare_arcs".to_owned(),
         files: PREPARE_ARCS.to_vec(),

@@ -1,7 +1,9 @@
 //! The kernels, one invocation at a time. Written by `cargo run -p tumble-shaders` from the shaders: change those.
 
 use crate::shader::*;
-use crate::twin::machine::{Entry, Float, Machine, barrier, both, choose, quotient, stored};
+use crate::twin::machine::{
+    Entry, Float, Machine, ballot, barrier, both, choose, quotient, shuffled, stored,
+};
 
 /// The variables of the kernels, by their names.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -116,7 +118,7 @@ pub(crate) const GLOBALS: usize = 48;
 pub(crate) const PRIVATE: [Global; 1] = [Global::FirstEntry];
 
 /// The variables that kernels bind, in the order of the bindings.
-const BOUND: [&[Global]; 24] = [
+const BOUND: [&[Global]; 25] = [
     &[Global::Probes, Global::Replies],
     &[
         Global::Segments,
@@ -221,6 +223,15 @@ const BOUND: [&[Global]; 24] = [
         Global::Values,
         Global::Halves,
     ],
+    &[
+        Global::Entries,
+        Global::Clips,
+        Global::TimeBases,
+        Global::Spans,
+        Global::Channels,
+        Global::Cells,
+        Global::Rotations,
+    ],
     &[Global::Keys, Global::Intervals, Global::Rotations],
 ];
 
@@ -239,9 +250,8 @@ const fn entry(
 }
 
 /// The entry points: those of the kernels in their order, and then those that read texel buffers.
-pub(crate) static ENTRIES: [Entry; 193] = [
+pub(crate) static ENTRIES: [Entry; 194] = [
     entry(0, None, 64, None),
-    entry(1, Some(Global::Dispatch), 64, Some(138)),
     entry(1, Some(Global::Dispatch), 64, Some(139)),
     entry(1, Some(Global::Dispatch), 64, Some(140)),
     entry(1, Some(Global::Dispatch), 64, Some(141)),
@@ -249,7 +259,7 @@ pub(crate) static ENTRIES: [Entry; 193] = [
     entry(1, Some(Global::Dispatch), 64, Some(143)),
     entry(1, Some(Global::Dispatch), 64, Some(144)),
     entry(1, Some(Global::Dispatch), 64, Some(145)),
-    entry(2, Some(Global::Dispatch), 64, Some(146)),
+    entry(1, Some(Global::Dispatch), 64, Some(146)),
     entry(2, Some(Global::Dispatch), 64, Some(147)),
     entry(2, Some(Global::Dispatch), 64, Some(148)),
     entry(2, Some(Global::Dispatch), 64, Some(149)),
@@ -257,7 +267,7 @@ pub(crate) static ENTRIES: [Entry; 193] = [
     entry(2, Some(Global::Dispatch), 64, Some(151)),
     entry(2, Some(Global::Dispatch), 64, Some(152)),
     entry(2, Some(Global::Dispatch), 64, Some(153)),
-    entry(3, Some(Global::Dispatch), 64, Some(154)),
+    entry(2, Some(Global::Dispatch), 64, Some(154)),
     entry(3, Some(Global::Dispatch), 64, Some(155)),
     entry(3, Some(Global::Dispatch), 64, Some(156)),
     entry(3, Some(Global::Dispatch), 64, Some(157)),
@@ -265,6 +275,7 @@ pub(crate) static ENTRIES: [Entry; 193] = [
     entry(3, Some(Global::Dispatch), 64, Some(159)),
     entry(3, Some(Global::Dispatch), 64, Some(160)),
     entry(3, Some(Global::Dispatch), 64, Some(161)),
+    entry(3, Some(Global::Dispatch), 64, Some(162)),
     entry(4, Some(Global::Dispatch), 64, None),
     entry(4, Some(Global::Dispatch), 64, None),
     entry(4, Some(Global::Dispatch), 64, None),
@@ -297,7 +308,6 @@ pub(crate) static ENTRIES: [Entry; 193] = [
     entry(2, Some(Global::Dispatch), 128, None),
     entry(2, Some(Global::Dispatch), 128, None),
     entry(2, Some(Global::Dispatch), 128, None),
-    entry(1, Some(Global::Dispatch), 64, Some(162)),
     entry(1, Some(Global::Dispatch), 64, Some(163)),
     entry(1, Some(Global::Dispatch), 64, Some(164)),
     entry(1, Some(Global::Dispatch), 64, Some(165)),
@@ -305,7 +315,7 @@ pub(crate) static ENTRIES: [Entry; 193] = [
     entry(1, Some(Global::Dispatch), 64, Some(167)),
     entry(1, Some(Global::Dispatch), 64, Some(168)),
     entry(1, Some(Global::Dispatch), 64, Some(169)),
-    entry(2, Some(Global::Dispatch), 64, Some(170)),
+    entry(1, Some(Global::Dispatch), 64, Some(170)),
     entry(2, Some(Global::Dispatch), 64, Some(171)),
     entry(2, Some(Global::Dispatch), 64, Some(172)),
     entry(2, Some(Global::Dispatch), 64, Some(173)),
@@ -313,7 +323,7 @@ pub(crate) static ENTRIES: [Entry; 193] = [
     entry(2, Some(Global::Dispatch), 64, Some(175)),
     entry(2, Some(Global::Dispatch), 64, Some(176)),
     entry(2, Some(Global::Dispatch), 64, Some(177)),
-    entry(3, Some(Global::Dispatch), 64, Some(178)),
+    entry(2, Some(Global::Dispatch), 64, Some(178)),
     entry(3, Some(Global::Dispatch), 64, Some(179)),
     entry(3, Some(Global::Dispatch), 64, Some(180)),
     entry(3, Some(Global::Dispatch), 64, Some(181)),
@@ -321,6 +331,7 @@ pub(crate) static ENTRIES: [Entry; 193] = [
     entry(3, Some(Global::Dispatch), 64, Some(183)),
     entry(3, Some(Global::Dispatch), 64, Some(184)),
     entry(3, Some(Global::Dispatch), 64, Some(185)),
+    entry(3, Some(Global::Dispatch), 64, Some(186)),
     entry(4, Some(Global::Dispatch), 64, None),
     entry(4, Some(Global::Dispatch), 64, None),
     entry(4, Some(Global::Dispatch), 64, None),
@@ -353,19 +364,19 @@ pub(crate) static ENTRIES: [Entry; 193] = [
     entry(2, Some(Global::Dispatch), 128, None),
     entry(2, Some(Global::Dispatch), 128, None),
     entry(2, Some(Global::Dispatch), 128, None),
-    entry(6, Some(Global::Rows), 64, Some(186)),
     entry(6, Some(Global::Rows), 64, Some(187)),
-    entry(7, Some(Global::Rows), 64, Some(188)),
+    entry(6, Some(Global::Rows), 64, Some(188)),
+    entry(7, Some(Global::Rows), 64, Some(189)),
     entry(8, Some(Global::Dispatch), 64, None),
     entry(9, Some(Global::Dispatch), 64, None),
     entry(10, Some(Global::Dispatch), 64, None),
     entry(11, Some(Global::Dispatch), 64, None),
     entry(12, Some(Global::Dispatch), 64, None),
     entry(13, Some(Global::Dispatch), 64, None),
-    entry(14, Some(Global::Dispatch), 64, Some(189)),
     entry(14, Some(Global::Dispatch), 64, Some(190)),
     entry(14, Some(Global::Dispatch), 64, Some(191)),
     entry(14, Some(Global::Dispatch), 64, Some(192)),
+    entry(14, Some(Global::Dispatch), 64, Some(193)),
     entry(15, Some(Global::Dispatch), 64, None),
     entry(16, Some(Global::Dispatch), 64, None),
     entry(17, Some(Global::Dispatch), 64, None),
@@ -378,6 +389,7 @@ pub(crate) static ENTRIES: [Entry; 193] = [
     entry(22, Some(Global::Dispatch), 64, None),
     entry(22, Some(Global::Dispatch), 64, None),
     entry(23, Some(Global::Dispatch), 64, None),
+    entry(24, Some(Global::Dispatch), 64, None),
     entry(1, Some(Global::Dispatch), 64, None),
     entry(1, Some(Global::Dispatch), 64, None),
     entry(1, Some(Global::Dispatch), 64, None),
@@ -532,6 +544,14 @@ pub(crate) struct CrowdLink {
 }
 
 stored!(CrowdLink, (), 2, joint 0, parent 1);
+
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct CrowdMove {
+    pub(crate) ticks: [u32; 2],
+    pub(crate) part: u32,
+}
+
+stored!(CrowdMove, (), 4, ticks 0, part 2);
 
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct CrowdPosition<F> {
@@ -695,6 +715,15 @@ pub(crate) struct SpreadRun<F> {
 stored!(SpreadRun, (<F>), 8, source 0, output 1, count 2, first 3, scale 4, offset 5, key 6, iterations 7);
 
 #[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Subgroup<F> {
+    pub(crate) row: u32,
+    pub(crate) span: u32,
+    pub(crate) parameter: F,
+}
+
+stored!(Subgroup, (<F>), 3, row 0, span 1, parameter 2);
+
+#[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct TangentWeights<F> {
     pub(crate) before: F,
     pub(crate) after: F,
@@ -791,7 +820,8 @@ pub(crate) fn arc_tangent<M: Machine>(machine: &M, y: M::F, x: M::F) -> M::F {
     if y < M::F::of(0.0) { -obtuse } else { obtuse }
 }
 
-/// An arc where its time base stands. The first cell is 0: a constant is an arc without a tangent.
+/// An arc where its time base stands. The first cell is 0: a constant or a key is an arc without a tangent, whose
+/// middle stays as it is.
 pub(crate) fn arc_value<M: Machine>(
     machine: &M,
     channel: CrowdChannel,
@@ -811,7 +841,7 @@ pub(crate) fn arc_value<M: Machine>(
     );
     let tangent = cell_at(
         machine,
-        if channel.count == 0u32 {
+        if is_key | (channel.count == 0u32) {
             0u32
         } else {
             middle.wrapping_add(channel.count)
@@ -826,7 +856,7 @@ pub(crate) fn arc_value<M: Machine>(
         at.parameter,
     );
     let result_2 = canonical(machine, result);
-    if is_key { key_or_first } else { result_2 }
+    result_2
 }
 
 /// A key with its stored sign.
@@ -858,6 +888,12 @@ pub(crate) fn axis_angle<M: Machine>(machine: &M, rotation: [M::F; 4]) -> [M::F;
     } else {
         axis_and_angle
     }
+}
+
+pub(crate) fn base_at<M: Machine>(machine: &M, index: u32) -> CrowdBase {
+    let _block = machine.block(line!(), 1);
+    let loaded = machine.load::<CrowdBase>(Global::TimeBases, 3 * (index as usize));
+    loaded
 }
 
 /// How many vectors of the line in which a vector is stored come before it. So many invocations are idle, so that
@@ -906,14 +942,14 @@ pub(crate) fn canonical_product<M: Machine>(
 }
 
 pub(crate) fn cell_at<M: Machine>(machine: &M, index: u32) -> [M::F; 4] {
-    const OF_KERNELS: [u8; 193] = [
+    const OF_KERNELS: [u8; 194] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1,
     ];
     match OF_KERNELS[machine.code()] {
         0 => cell_at_of_readers(machine, index),
@@ -957,14 +993,14 @@ pub(crate) fn cell_of<M: Machine>(machine: &M, corner: Corner, iteration: u32) -
 }
 
 pub(crate) fn channel_at<M: Machine>(machine: &M, index: u32) -> CrowdChannel {
-    const OF_KERNELS: [u8; 193] = [
+    const OF_KERNELS: [u8; 194] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1,
     ];
     match OF_KERNELS[machine.code()] {
         0 => channel_at_of_readers(machine, index),
@@ -987,6 +1023,12 @@ pub(crate) fn channel_at_of_readers_2<M: Machine>(machine: &M, index: u32) -> Cr
         form_and_base: all[2],
         keys: all[3],
     }
+}
+
+pub(crate) fn clip_at<M: Machine>(machine: &M, index: u32) -> CrowdClip {
+    let _block = machine.block(line!(), 1);
+    let loaded = machine.load::<CrowdClip>(Global::Clips, 3 * (index as usize));
+    loaded
 }
 
 /// The Hamilton product a b.
@@ -1017,14 +1059,14 @@ pub(crate) fn composed<M: Machine>(
 }
 
 pub(crate) fn constant_at<M: Machine>(machine: &M, index: u32) -> [M::F; 4] {
-    const OF_KERNELS: [u8; 193] = [
+    const OF_KERNELS: [u8; 194] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
         1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
-        1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0,
+        1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => constant_at_of_readers(machine, index),
@@ -1157,14 +1199,14 @@ pub(crate) fn cross3<M: Machine>(machine: &M, a: [M::F; 3], b: [M::F; 3]) -> [M:
 }
 
 pub(crate) fn crowd_work<M: Machine>(machine: &M, index: u32) {
-    const OF_KERNELS: [u8; 193] = [
+    const OF_KERNELS: [u8; 194] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 1, 1, 2, 3, 4, 5, 0, 6, 7, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1,
     ];
     match OF_KERNELS[machine.code()] {
         0 => crowd_work_of_rotations(machine, index),
@@ -1438,14 +1480,14 @@ pub(crate) fn cubic_value<M: Machine>(
 }
 
 pub(crate) fn distance_at<M: Machine>(machine: &M, index: u32) -> M::F {
-    const OF_KERNELS: [u8; 193] = [
+    const OF_KERNELS: [u8; 194] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1,
-        1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1,
+        1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => distance_at_of_readers(machine, index),
@@ -1471,14 +1513,14 @@ pub(crate) fn distance_at_of_readers_2<M: Machine>(machine: &M, index: u32) -> M
 }
 
 pub(crate) fn distance_from_middle<M: Machine>(machine: &M, first: i32, j: u32) -> M::F {
-    const OF_KERNELS: [u8; 193] = [
+    const OF_KERNELS: [u8; 194] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0,
         0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1,
         1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1,
-        1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1,
+        1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => distance_from_middle_of_frame_distance(machine, first, j),
@@ -1521,14 +1563,14 @@ pub(crate) fn dot4<M: Machine>(machine: &M, a: [M::F; 4], b: [M::F; 4]) -> M::F 
 }
 
 pub(crate) fn entry_at<M: Machine>(machine: &M, index: u32) -> CrowdEntry {
-    const OF_KERNELS: [u8; 193] = [
+    const OF_KERNELS: [u8; 194] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 2, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 2, 2, 2, 2,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 2, 2, 2, 2,
     ];
     match OF_KERNELS[machine.code()] {
         0 => entry_at_of_readers(machine, index),
@@ -1660,6 +1702,7 @@ pub(crate) fn evaluate_arc_segment<M: Machine>(
     result_2
 }
 
+/// The value at the `j`th sample of a run that needs no care and has no key there. `constant` is its segment's.
 pub(crate) fn evaluate_near_arc_segment<M: Machine>(
     machine: &M,
     item: SpreadRun<M::F>,
@@ -1674,6 +1717,7 @@ pub(crate) fn evaluate_near_arc_segment<M: Machine>(
     result_2
 }
 
+/// The value at the `j`th sample of a run that needs no care and has no key there. `constant` is its segment's.
 pub(crate) fn evaluate_near_polynomial_segment<M: Machine>(
     machine: &M,
     item: SpreadRun<M::F>,
@@ -1820,14 +1864,14 @@ pub(crate) async fn finish_2<M: Machine>(
     rotation: [M::F; 4],
     is_stored: bool,
 ) {
-    const OF_KERNELS: [u8; 193] = [
+    const OF_KERNELS: [u8; 194] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 2,
         3, 0, 1, 0, 1, 0, 0, 2, 3, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 2, 3, 0, 1, 0,
         1, 0, 0, 2, 3, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => finish_2_of_alone(machine, lane, index, rotation, is_stored).await,
@@ -2040,6 +2084,40 @@ pub(crate) fn has<M: Machine>(machine: &M, item: Item<M::F>, position: u32) -> b
     position.wrapping_sub(item.output) < item.count & 0x3fffffffu32
 }
 
+/// The tick at which a layer stands that does not go on behind an end of its clip. It has moved by `ticks` and, if
+/// `part` is 1, a part of one more.
+pub(crate) fn held_tick<M: Machine>(
+    machine: &M,
+    start: u32,
+    ticks: [u32; 2],
+    part: u32,
+    backwards: bool,
+    period: u32,
+) -> u32 {
+    let _block = machine.block(line!(), 17);
+    let end = period.wrapping_add(START_BIAS);
+    let later = start.wrapping_add(ticks[0]);
+    let earlier = start.wrapping_sub(ticks[0]).wrapping_sub(part);
+    let is_beyond = (ticks[1] != 0u32)
+        | (if backwards {
+            start <= ticks[0]
+        } else {
+            later < start
+        });
+    let moved = if backwards { earlier } else { later };
+    let tick = if is_beyond {
+        if backwards { 0u32 } else { end }
+    } else {
+        moved
+    };
+    (if tick < START_BIAS {
+        START_BIAS
+    } else {
+        if tick > end { end } else { tick }
+    })
+    .wrapping_sub(START_BIAS)
+}
+
 pub(crate) fn hoisted_arcs_hoisted<M: Machine>(
     machine: &M,
     first: u32,
@@ -2072,12 +2150,6 @@ pub(crate) fn hoisted_two_keys_hoisted<M: Machine>(
     parameter: M::F,
 ) -> TwoKeysHoisted<M::F> {
     TwoKeysHoisted { parameter }
-}
-
-/// A number of ticks in units of 2^-16.
-pub(crate) fn in_parts<M: Machine>(machine: &M, ticks: u32) -> [u32; 2] {
-    let _block = machine.block(line!(), 2);
-    [ticks << 16u32, ticks >> 16u32]
 }
 
 /// Begins with the instances of a workgroup, from the `first` of the dispatch on; returns how many they are.
@@ -2130,15 +2202,22 @@ pub(crate) fn invocation_index<M: Machine>(
         .wrapping_add(invocation[0])
 }
 
+/// Whether a condition holds in any lane.
+pub(crate) async fn is_any<M: Machine>(machine: &M, condition: bool) -> bool {
+    let _block = machine.block(line!(), 3);
+    let holds = ballot(machine, condition).await;
+    holds[0] | holds[1] != 0u32
+}
+
 pub(crate) fn item_at_item<M: Machine>(machine: &M, index: u32) -> Item<M::F> {
-    const OF_KERNELS: [u8; 193] = [
+    const OF_KERNELS: [u8; 194] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
-        1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
+        1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => item_at_item_of_readers(machine, index),
@@ -2322,14 +2401,14 @@ pub(crate) fn layer_value<M: Machine>(
 }
 
 pub(crate) fn layered<M: Machine>(machine: &M, instance: u32, joint: u32, kind: u32) -> [M::F; 4] {
-    const OF_KERNELS: [u8; 193] = [
+    const OF_KERNELS: [u8; 194] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 1, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 1,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 1,
     ];
     match OF_KERNELS[machine.code()] {
         0 => layered_of_layers(machine, instance, joint, kind),
@@ -2469,14 +2548,14 @@ pub(crate) fn magnitude<M: Machine>(machine: &M, x: M::F) -> M::F {
 }
 
 pub(crate) async fn main<M: Machine>(machine: &M) {
-    const OF_KERNELS: [u8; 193] = [
+    const OF_KERNELS: [u8; 194] = [
         0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 2, 2, 2, 2, 2, 2, 2, 2, 3, 3, 3, 3, 3,
         3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 4, 5, 4, 4, 6, 7, 4, 5, 4, 5, 4, 4, 6, 7, 4, 5, 8, 8, 8,
         8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 9, 9, 9, 9, 9, 9, 9, 9, 10, 10, 10, 10, 10, 10, 10,
         10, 10, 10, 10, 10, 10, 10, 10, 10, 11, 12, 11, 11, 13, 14, 11, 12, 11, 12, 11, 11, 13, 14,
         11, 12, 15, 16, 17, 18, 18, 18, 18, 18, 18, 19, 19, 19, 19, 19, 19, 19, 19, 20, 19, 19, 21,
-        21, 22, 22, 23, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 2, 2, 2, 2, 2, 2, 2, 2, 8,
-        8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 9, 9, 9, 9, 9, 9, 9, 9, 15, 16, 17, 19, 19,
+        21, 22, 22, 23, 24, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 2, 2, 2, 2, 2, 2, 2, 2,
+        8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 9, 9, 9, 9, 9, 9, 9, 9, 15, 16, 17, 19, 19,
         19, 19,
     ];
     match OF_KERNELS[machine.code()] {
@@ -2503,6 +2582,7 @@ pub(crate) async fn main<M: Machine>(machine: &M) {
         20 => main_of_walk_all(machine).await,
         21 => main_of_whole_rotations(machine).await,
         22 => main_of_whole_matrices(machine).await,
+        23 => main_of_subgroup_rotations(machine).await,
         _ => main_of_prepare_arcs(machine).await,
     }
 }
@@ -2793,10 +2873,12 @@ pub(crate) async fn main_of_together<M: Machine>(machine: &M) {
     let mut begin: u32 = 0u32;
     let mut end: u32 = Default::default();
     let mut iteration: u32 = 0u32;
+    let mut rotation: [M::F; 4] = Default::default();
     let mut all: [M::F; 3] = Default::default();
     let mut part: u32 = Default::default();
     let mut part_2: u32 = Default::default();
-    let _block = machine.block(line!(), 34);
+    let mut part_3: u32 = Default::default();
+    let _block = machine.block(line!(), 41);
     let loaded = machine.load::<u32>(Global::Dispatch, 4);
     let lanes = 1u32 << loaded;
     let workgroup = group[1].wrapping_mul(groups[0]).wrapping_add(group[0]);
@@ -2829,86 +2911,139 @@ pub(crate) async fn main_of_together<M: Machine>(machine: &M) {
             location[0]
         },
     );
+    let constant = constant_of_arc_segment(machine, segment);
     let loaded_10 = item;
     let count = sample_count(machine, loaded_10);
     let first = location[1];
     let loaded_11 = machine.load::<u32>(Global::Dispatch, 5);
     let idle = first & loaded_11;
     let lane = invocation & lanes.wrapping_sub(1u32);
+    let lane_part = (lane & 0xfffffff8u32)
+        .wrapping_mul(3u32)
+        .wrapping_add(lane & 7u32);
+    let line_lanes = if lanes >= LINE { lanes } else { 0u32 };
     end = lanes.wrapping_sub(idle);
     loop {
-        let _block = machine.block(line!(), 35);
+        let _block = machine.block(line!(), 30);
         let loaded_12 = iteration;
-        if !(loaded_12 < iterations) {
-            break;
-        }
-        let loaded_13 = iteration;
-        let values = (loaded_13 & 1u32)
+        let values = (loaded_12 & 1u32)
             .wrapping_mul(SPREAD_WORKGROUP)
             .wrapping_add(invocation)
             .wrapping_sub(lane)
             .wrapping_mul(3u32);
-        let loaded_14 = end;
-        let j = loaded_14.wrapping_sub(lanes).wrapping_add(lane);
+        let loaded_13 = end;
+        let j = loaded_13.wrapping_sub(lanes).wrapping_add(lane);
         if j < count {
-            let _block = machine.block(line!(), 5);
-            let loaded_15 = item;
-            let result_3 = sample_of_arc_segment(machine, loaded_15, segment, j, group[2]);
-            let result_4 = parts_1(machine, result_3);
-            all = result_4;
+            let _block = machine.block(line!(), 13);
+            rotation = <[M::F; 4]>::default();
+            let loaded_14 = item.count;
+            let loaded_15 = item.key;
+            if (loaded_14 < NEEDS_CARE) & ((j != 0u32) | (loaded_15 == NO_KEY)) {
+                let _block = machine.block(line!(), 3);
+                let loaded_16 = item;
+                let result_3 = evaluate_near_arc_segment(machine, loaded_16, segment, constant, j);
+                rotation = result_3;
+            } else {
+                let _block = machine.block(line!(), 3);
+                let loaded_17 = item;
+                let result_4 = sample_of_arc_segment(machine, loaded_17, segment, j, group[2]);
+                rotation = result_4;
+            }
+            let loaded_18 = rotation;
+            let result_5 = parts_1(machine, loaded_18);
+            all = result_5;
             part = 0u32;
             loop {
                 let _block = machine.block(line!(), 13);
-                let loaded_16 = part;
-                if !(loaded_16 < 3u32) {
+                let loaded_19 = part;
+                if !(loaded_19 < 3u32) {
                     break;
                 }
-                let loaded_17 = part;
-                let loaded_18 = part;
-                let loaded_19 = all[loaded_18 as usize];
+                let loaded_20 = part;
+                let loaded_21 = part;
+                let loaded_22 = all[loaded_21 as usize];
                 machine.store::<M::F>(
                     Global::Tile,
                     values
                         .wrapping_add(lane.wrapping_mul(3u32))
-                        .wrapping_add(loaded_17) as usize,
-                    loaded_19,
+                        .wrapping_add(loaded_20) as usize,
+                    loaded_22,
                 );
-                let loaded_20 = part;
-                part = loaded_20.wrapping_add(1u32);
+                let loaded_23 = part;
+                part = loaded_23.wrapping_add(1u32);
             }
         }
         barrier().await;
-        let loaded_21 = end;
-        let shift = values.wrapping_add(lanes.wrapping_sub(loaded_21).wrapping_mul(3u32));
-        let loaded_22 = end;
-        let loaded_23 = end;
-        let parts_end = (if count < loaded_23 { count } else { loaded_22 }).wrapping_mul(3u32);
-        let loaded_24 = begin;
-        part_2 = loaded_24.wrapping_mul(3u32).wrapping_add(lane);
-        loop {
-            let _block = machine.block(line!(), 13);
-            let loaded_25 = part_2;
-            if !(loaded_25 < parts_end) {
-                break;
+        let loaded_24 = end;
+        let loaded_25 = begin;
+        let loaded_26 = end;
+        if (loaded_24.wrapping_sub(loaded_25) == line_lanes) & (loaded_26 <= count) {
+            let _block = machine.block(line!(), 6);
+            let found = values.wrapping_add(lane_part);
+            let loaded_27 = begin;
+            let stored = first
+                .wrapping_add(loaded_27)
+                .wrapping_mul(3u32)
+                .wrapping_add(lane_part);
+            part_2 = 0u32;
+            loop {
+                let _block = machine.block(line!(), 14);
+                let loaded_28 = part_2;
+                if !(loaded_28 < 3u32) {
+                    break;
+                }
+                let loaded_29 = part_2;
+                let loaded_30 = part_2;
+                let loaded_31 = machine.load::<M::F>(
+                    Global::Tile,
+                    found.wrapping_add(loaded_30.wrapping_mul(LINE)) as usize,
+                );
+                machine.store::<M::F>(
+                    Global::Rotations,
+                    stored.wrapping_add(loaded_29.wrapping_mul(LINE)) as usize,
+                    loaded_31,
+                );
+                let loaded_32 = part_2;
+                part_2 = loaded_32.wrapping_add(1u32);
             }
-            let loaded_26 = part_2;
-            let loaded_27 = part_2;
-            let loaded_28 =
-                machine.load::<M::F>(Global::Tile, shift.wrapping_add(loaded_27) as usize);
-            machine.store::<M::F>(
-                Global::Rotations,
-                first.wrapping_mul(3u32).wrapping_add(loaded_26) as usize,
-                loaded_28,
-            );
-            let loaded_29 = part_2;
-            part_2 = loaded_29.wrapping_add(lanes);
+        } else {
+            let _block = machine.block(line!(), 13);
+            let loaded_33 = end;
+            let shift = values.wrapping_add(lanes.wrapping_sub(loaded_33).wrapping_mul(3u32));
+            let loaded_34 = end;
+            let loaded_35 = end;
+            let parts_end = (if count < loaded_35 { count } else { loaded_34 }).wrapping_mul(3u32);
+            let loaded_36 = begin;
+            part_3 = loaded_36.wrapping_mul(3u32).wrapping_add(lane);
+            loop {
+                let _block = machine.block(line!(), 13);
+                let loaded_37 = part_3;
+                if !(loaded_37 < parts_end) {
+                    break;
+                }
+                let loaded_38 = part_3;
+                let loaded_39 = part_3;
+                let loaded_40 =
+                    machine.load::<M::F>(Global::Tile, shift.wrapping_add(loaded_39) as usize);
+                machine.store::<M::F>(
+                    Global::Rotations,
+                    first.wrapping_mul(3u32).wrapping_add(loaded_38) as usize,
+                    loaded_40,
+                );
+                let loaded_41 = part_3;
+                part_3 = loaded_41.wrapping_add(lanes);
+            }
         }
-        let loaded_30 = end;
-        begin = loaded_30;
-        let loaded_31 = end;
-        end = loaded_31.wrapping_add(lanes);
-        let loaded_32 = iteration;
-        iteration = loaded_32.wrapping_add(1u32);
+        let loaded_42 = end;
+        begin = loaded_42;
+        let loaded_43 = end;
+        end = loaded_43.wrapping_add(lanes);
+        let loaded_44 = iteration;
+        iteration = loaded_44.wrapping_add(1u32);
+        let loaded_45 = iteration;
+        if loaded_45 >= iterations {
+            break;
+        }
     }
 }
 
@@ -2920,10 +3055,12 @@ pub(crate) async fn main_of_together_2<M: Machine>(machine: &M) {
     let mut begin: u32 = 0u32;
     let mut end: u32 = Default::default();
     let mut iteration: u32 = 0u32;
+    let mut rotation: [M::F; 4] = Default::default();
     let mut all: [M::F; 9] = Default::default();
     let mut part: u32 = Default::default();
     let mut part_2: u32 = Default::default();
-    let _block = machine.block(line!(), 34);
+    let mut part_3: u32 = Default::default();
+    let _block = machine.block(line!(), 41);
     let loaded = machine.load::<u32>(Global::Dispatch, 4);
     let lanes = 1u32 << loaded;
     let workgroup = group[1].wrapping_mul(groups[0]).wrapping_add(group[0]);
@@ -2956,86 +3093,139 @@ pub(crate) async fn main_of_together_2<M: Machine>(machine: &M) {
             location[0]
         },
     );
+    let constant = constant_of_arc_segment(machine, segment);
     let loaded_10 = item;
     let count = sample_count(machine, loaded_10);
     let first = location[1];
     let loaded_11 = machine.load::<u32>(Global::Dispatch, 5);
     let idle = first & loaded_11;
     let lane = invocation & lanes.wrapping_sub(1u32);
+    let lane_part = (lane & 0xfffffff8u32)
+        .wrapping_mul(9u32)
+        .wrapping_add(lane & 7u32);
+    let line_lanes = if lanes >= LINE { lanes } else { 0u32 };
     end = lanes.wrapping_sub(idle);
     loop {
-        let _block = machine.block(line!(), 35);
+        let _block = machine.block(line!(), 30);
         let loaded_12 = iteration;
-        if !(loaded_12 < iterations) {
-            break;
-        }
-        let loaded_13 = iteration;
-        let values = (loaded_13 & 1u32)
+        let values = (loaded_12 & 1u32)
             .wrapping_mul(SPREAD_WORKGROUP)
             .wrapping_add(invocation)
             .wrapping_sub(lane)
             .wrapping_mul(9u32);
-        let loaded_14 = end;
-        let j = loaded_14.wrapping_sub(lanes).wrapping_add(lane);
+        let loaded_13 = end;
+        let j = loaded_13.wrapping_sub(lanes).wrapping_add(lane);
         if j < count {
-            let _block = machine.block(line!(), 5);
-            let loaded_15 = item;
-            let result_3 = sample_of_arc_segment(machine, loaded_15, segment, j, group[2]);
-            let result_4 = parts_2(machine, result_3);
-            all = result_4;
+            let _block = machine.block(line!(), 13);
+            rotation = <[M::F; 4]>::default();
+            let loaded_14 = item.count;
+            let loaded_15 = item.key;
+            if (loaded_14 < NEEDS_CARE) & ((j != 0u32) | (loaded_15 == NO_KEY)) {
+                let _block = machine.block(line!(), 3);
+                let loaded_16 = item;
+                let result_3 = evaluate_near_arc_segment(machine, loaded_16, segment, constant, j);
+                rotation = result_3;
+            } else {
+                let _block = machine.block(line!(), 3);
+                let loaded_17 = item;
+                let result_4 = sample_of_arc_segment(machine, loaded_17, segment, j, group[2]);
+                rotation = result_4;
+            }
+            let loaded_18 = rotation;
+            let result_5 = parts_2(machine, loaded_18);
+            all = result_5;
             part = 0u32;
             loop {
                 let _block = machine.block(line!(), 13);
-                let loaded_16 = part;
-                if !(loaded_16 < 9u32) {
+                let loaded_19 = part;
+                if !(loaded_19 < 9u32) {
                     break;
                 }
-                let loaded_17 = part;
-                let loaded_18 = part;
-                let loaded_19 = all[loaded_18 as usize];
+                let loaded_20 = part;
+                let loaded_21 = part;
+                let loaded_22 = all[loaded_21 as usize];
                 machine.store::<M::F>(
                     Global::Tile,
                     values
                         .wrapping_add(lane.wrapping_mul(9u32))
-                        .wrapping_add(loaded_17) as usize,
-                    loaded_19,
+                        .wrapping_add(loaded_20) as usize,
+                    loaded_22,
                 );
-                let loaded_20 = part;
-                part = loaded_20.wrapping_add(1u32);
+                let loaded_23 = part;
+                part = loaded_23.wrapping_add(1u32);
             }
         }
         barrier().await;
-        let loaded_21 = end;
-        let shift = values.wrapping_add(lanes.wrapping_sub(loaded_21).wrapping_mul(9u32));
-        let loaded_22 = end;
-        let loaded_23 = end;
-        let parts_end = (if count < loaded_23 { count } else { loaded_22 }).wrapping_mul(9u32);
-        let loaded_24 = begin;
-        part_2 = loaded_24.wrapping_mul(9u32).wrapping_add(lane);
-        loop {
-            let _block = machine.block(line!(), 13);
-            let loaded_25 = part_2;
-            if !(loaded_25 < parts_end) {
-                break;
+        let loaded_24 = end;
+        let loaded_25 = begin;
+        let loaded_26 = end;
+        if (loaded_24.wrapping_sub(loaded_25) == line_lanes) & (loaded_26 <= count) {
+            let _block = machine.block(line!(), 6);
+            let found = values.wrapping_add(lane_part);
+            let loaded_27 = begin;
+            let stored = first
+                .wrapping_add(loaded_27)
+                .wrapping_mul(9u32)
+                .wrapping_add(lane_part);
+            part_2 = 0u32;
+            loop {
+                let _block = machine.block(line!(), 14);
+                let loaded_28 = part_2;
+                if !(loaded_28 < 9u32) {
+                    break;
+                }
+                let loaded_29 = part_2;
+                let loaded_30 = part_2;
+                let loaded_31 = machine.load::<M::F>(
+                    Global::Tile,
+                    found.wrapping_add(loaded_30.wrapping_mul(LINE)) as usize,
+                );
+                machine.store::<M::F>(
+                    Global::Rotations,
+                    stored.wrapping_add(loaded_29.wrapping_mul(LINE)) as usize,
+                    loaded_31,
+                );
+                let loaded_32 = part_2;
+                part_2 = loaded_32.wrapping_add(1u32);
             }
-            let loaded_26 = part_2;
-            let loaded_27 = part_2;
-            let loaded_28 =
-                machine.load::<M::F>(Global::Tile, shift.wrapping_add(loaded_27) as usize);
-            machine.store::<M::F>(
-                Global::Rotations,
-                first.wrapping_mul(9u32).wrapping_add(loaded_26) as usize,
-                loaded_28,
-            );
-            let loaded_29 = part_2;
-            part_2 = loaded_29.wrapping_add(lanes);
+        } else {
+            let _block = machine.block(line!(), 13);
+            let loaded_33 = end;
+            let shift = values.wrapping_add(lanes.wrapping_sub(loaded_33).wrapping_mul(9u32));
+            let loaded_34 = end;
+            let loaded_35 = end;
+            let parts_end = (if count < loaded_35 { count } else { loaded_34 }).wrapping_mul(9u32);
+            let loaded_36 = begin;
+            part_3 = loaded_36.wrapping_mul(9u32).wrapping_add(lane);
+            loop {
+                let _block = machine.block(line!(), 13);
+                let loaded_37 = part_3;
+                if !(loaded_37 < parts_end) {
+                    break;
+                }
+                let loaded_38 = part_3;
+                let loaded_39 = part_3;
+                let loaded_40 =
+                    machine.load::<M::F>(Global::Tile, shift.wrapping_add(loaded_39) as usize);
+                machine.store::<M::F>(
+                    Global::Rotations,
+                    first.wrapping_mul(9u32).wrapping_add(loaded_38) as usize,
+                    loaded_40,
+                );
+                let loaded_41 = part_3;
+                part_3 = loaded_41.wrapping_add(lanes);
+            }
         }
-        let loaded_30 = end;
-        begin = loaded_30;
-        let loaded_31 = end;
-        end = loaded_31.wrapping_add(lanes);
-        let loaded_32 = iteration;
-        iteration = loaded_32.wrapping_add(1u32);
+        let loaded_42 = end;
+        begin = loaded_42;
+        let loaded_43 = end;
+        end = loaded_43.wrapping_add(lanes);
+        let loaded_44 = iteration;
+        iteration = loaded_44.wrapping_add(1u32);
+        let loaded_45 = iteration;
+        if loaded_45 >= iterations {
+            break;
+        }
     }
 }
 
@@ -3047,10 +3237,12 @@ pub(crate) async fn main_of_together_3<M: Machine>(machine: &M) {
     let mut begin: u32 = 0u32;
     let mut end: u32 = Default::default();
     let mut iteration: u32 = 0u32;
+    let mut rotation: [M::F; 4] = Default::default();
     let mut all: [[M::F; 4]; 3] = Default::default();
     let mut part: u32 = Default::default();
     let mut part_2: u32 = Default::default();
-    let _block = machine.block(line!(), 34);
+    let mut part_3: u32 = Default::default();
+    let _block = machine.block(line!(), 41);
     let loaded = machine.load::<u32>(Global::Dispatch, 4);
     let lanes = 1u32 << loaded;
     let workgroup = group[1].wrapping_mul(groups[0]).wrapping_add(group[0]);
@@ -3083,86 +3275,139 @@ pub(crate) async fn main_of_together_3<M: Machine>(machine: &M) {
             location[0]
         },
     );
+    let constant = constant_of_arc_segment(machine, segment);
     let loaded_10 = item;
     let count = sample_count(machine, loaded_10);
     let first = location[1];
     let loaded_11 = machine.load::<u32>(Global::Dispatch, 5);
     let idle = first & loaded_11;
     let lane = invocation & lanes.wrapping_sub(1u32);
+    let lane_part = (lane & 0xfffffff8u32)
+        .wrapping_mul(3u32)
+        .wrapping_add(lane & 7u32);
+    let line_lanes = if lanes >= LINE { lanes } else { 0u32 };
     end = lanes.wrapping_sub(idle);
     loop {
-        let _block = machine.block(line!(), 35);
+        let _block = machine.block(line!(), 30);
         let loaded_12 = iteration;
-        if !(loaded_12 < iterations) {
-            break;
-        }
-        let loaded_13 = iteration;
-        let values = (loaded_13 & 1u32)
+        let values = (loaded_12 & 1u32)
             .wrapping_mul(SPREAD_WORKGROUP)
             .wrapping_add(invocation)
             .wrapping_sub(lane)
             .wrapping_mul(3u32);
-        let loaded_14 = end;
-        let j = loaded_14.wrapping_sub(lanes).wrapping_add(lane);
+        let loaded_13 = end;
+        let j = loaded_13.wrapping_sub(lanes).wrapping_add(lane);
         if j < count {
-            let _block = machine.block(line!(), 5);
-            let loaded_15 = item;
-            let result_3 = sample_of_arc_segment(machine, loaded_15, segment, j, group[2]);
-            let result_4 = parts_3(machine, result_3);
-            all = result_4;
+            let _block = machine.block(line!(), 13);
+            rotation = <[M::F; 4]>::default();
+            let loaded_14 = item.count;
+            let loaded_15 = item.key;
+            if (loaded_14 < NEEDS_CARE) & ((j != 0u32) | (loaded_15 == NO_KEY)) {
+                let _block = machine.block(line!(), 3);
+                let loaded_16 = item;
+                let result_3 = evaluate_near_arc_segment(machine, loaded_16, segment, constant, j);
+                rotation = result_3;
+            } else {
+                let _block = machine.block(line!(), 3);
+                let loaded_17 = item;
+                let result_4 = sample_of_arc_segment(machine, loaded_17, segment, j, group[2]);
+                rotation = result_4;
+            }
+            let loaded_18 = rotation;
+            let result_5 = parts_3(machine, loaded_18);
+            all = result_5;
             part = 0u32;
             loop {
                 let _block = machine.block(line!(), 13);
-                let loaded_16 = part;
-                if !(loaded_16 < 3u32) {
+                let loaded_19 = part;
+                if !(loaded_19 < 3u32) {
                     break;
                 }
-                let loaded_17 = part;
-                let loaded_18 = part;
-                let loaded_19 = all[loaded_18 as usize];
+                let loaded_20 = part;
+                let loaded_21 = part;
+                let loaded_22 = all[loaded_21 as usize];
                 machine.store::<[M::F; 4]>(
                     Global::Tile,
                     4 * (values
                         .wrapping_add(lane.wrapping_mul(3u32))
-                        .wrapping_add(loaded_17) as usize),
-                    loaded_19,
+                        .wrapping_add(loaded_20) as usize),
+                    loaded_22,
                 );
-                let loaded_20 = part;
-                part = loaded_20.wrapping_add(1u32);
+                let loaded_23 = part;
+                part = loaded_23.wrapping_add(1u32);
             }
         }
         barrier().await;
-        let loaded_21 = end;
-        let shift = values.wrapping_add(lanes.wrapping_sub(loaded_21).wrapping_mul(3u32));
-        let loaded_22 = end;
-        let loaded_23 = end;
-        let parts_end = (if count < loaded_23 { count } else { loaded_22 }).wrapping_mul(3u32);
-        let loaded_24 = begin;
-        part_2 = loaded_24.wrapping_mul(3u32).wrapping_add(lane);
-        loop {
-            let _block = machine.block(line!(), 13);
-            let loaded_25 = part_2;
-            if !(loaded_25 < parts_end) {
-                break;
+        let loaded_24 = end;
+        let loaded_25 = begin;
+        let loaded_26 = end;
+        if (loaded_24.wrapping_sub(loaded_25) == line_lanes) & (loaded_26 <= count) {
+            let _block = machine.block(line!(), 6);
+            let found = values.wrapping_add(lane_part);
+            let loaded_27 = begin;
+            let stored = first
+                .wrapping_add(loaded_27)
+                .wrapping_mul(3u32)
+                .wrapping_add(lane_part);
+            part_2 = 0u32;
+            loop {
+                let _block = machine.block(line!(), 14);
+                let loaded_28 = part_2;
+                if !(loaded_28 < 3u32) {
+                    break;
+                }
+                let loaded_29 = part_2;
+                let loaded_30 = part_2;
+                let loaded_31 = machine.load::<[M::F; 4]>(
+                    Global::Tile,
+                    4 * (found.wrapping_add(loaded_30.wrapping_mul(LINE)) as usize),
+                );
+                machine.store::<[M::F; 4]>(
+                    Global::Rotations,
+                    4 * (stored.wrapping_add(loaded_29.wrapping_mul(LINE)) as usize),
+                    loaded_31,
+                );
+                let loaded_32 = part_2;
+                part_2 = loaded_32.wrapping_add(1u32);
             }
-            let loaded_26 = part_2;
-            let loaded_27 = part_2;
-            let loaded_28 = machine
-                .load::<[M::F; 4]>(Global::Tile, 4 * (shift.wrapping_add(loaded_27) as usize));
-            machine.store::<[M::F; 4]>(
-                Global::Rotations,
-                4 * (first.wrapping_mul(3u32).wrapping_add(loaded_26) as usize),
-                loaded_28,
-            );
-            let loaded_29 = part_2;
-            part_2 = loaded_29.wrapping_add(lanes);
+        } else {
+            let _block = machine.block(line!(), 13);
+            let loaded_33 = end;
+            let shift = values.wrapping_add(lanes.wrapping_sub(loaded_33).wrapping_mul(3u32));
+            let loaded_34 = end;
+            let loaded_35 = end;
+            let parts_end = (if count < loaded_35 { count } else { loaded_34 }).wrapping_mul(3u32);
+            let loaded_36 = begin;
+            part_3 = loaded_36.wrapping_mul(3u32).wrapping_add(lane);
+            loop {
+                let _block = machine.block(line!(), 13);
+                let loaded_37 = part_3;
+                if !(loaded_37 < parts_end) {
+                    break;
+                }
+                let loaded_38 = part_3;
+                let loaded_39 = part_3;
+                let loaded_40 = machine
+                    .load::<[M::F; 4]>(Global::Tile, 4 * (shift.wrapping_add(loaded_39) as usize));
+                machine.store::<[M::F; 4]>(
+                    Global::Rotations,
+                    4 * (first.wrapping_mul(3u32).wrapping_add(loaded_38) as usize),
+                    loaded_40,
+                );
+                let loaded_41 = part_3;
+                part_3 = loaded_41.wrapping_add(lanes);
+            }
         }
-        let loaded_30 = end;
-        begin = loaded_30;
-        let loaded_31 = end;
-        end = loaded_31.wrapping_add(lanes);
-        let loaded_32 = iteration;
-        iteration = loaded_32.wrapping_add(1u32);
+        let loaded_42 = end;
+        begin = loaded_42;
+        let loaded_43 = end;
+        end = loaded_43.wrapping_add(lanes);
+        let loaded_44 = iteration;
+        iteration = loaded_44.wrapping_add(1u32);
+        let loaded_45 = iteration;
+        if loaded_45 >= iterations {
+            break;
+        }
     }
 }
 
@@ -3428,10 +3673,12 @@ pub(crate) async fn main_of_together_4<M: Machine>(machine: &M) {
     let mut begin: u32 = 0u32;
     let mut end: u32 = Default::default();
     let mut iteration: u32 = 0u32;
+    let mut rotation: [M::F; 4] = Default::default();
     let mut all: [M::F; 3] = Default::default();
     let mut part: u32 = Default::default();
     let mut part_2: u32 = Default::default();
-    let _block = machine.block(line!(), 34);
+    let mut part_3: u32 = Default::default();
+    let _block = machine.block(line!(), 41);
     let loaded = machine.load::<u32>(Global::Dispatch, 4);
     let lanes = 1u32 << loaded;
     let workgroup = group[1].wrapping_mul(groups[0]).wrapping_add(group[0]);
@@ -3464,86 +3711,141 @@ pub(crate) async fn main_of_together_4<M: Machine>(machine: &M) {
             location[0]
         },
     );
+    let constant = constant_of_polynomial_segment(machine, segment);
     let loaded_10 = item;
     let count = sample_count(machine, loaded_10);
     let first = location[1];
     let loaded_11 = machine.load::<u32>(Global::Dispatch, 5);
     let idle = first & loaded_11;
     let lane = invocation & lanes.wrapping_sub(1u32);
+    let lane_part = (lane & 0xfffffff8u32)
+        .wrapping_mul(3u32)
+        .wrapping_add(lane & 7u32);
+    let line_lanes = if lanes >= LINE { lanes } else { 0u32 };
     end = lanes.wrapping_sub(idle);
     loop {
-        let _block = machine.block(line!(), 35);
+        let _block = machine.block(line!(), 30);
         let loaded_12 = iteration;
-        if !(loaded_12 < iterations) {
-            break;
-        }
-        let loaded_13 = iteration;
-        let values = (loaded_13 & 1u32)
+        let values = (loaded_12 & 1u32)
             .wrapping_mul(SPREAD_WORKGROUP)
             .wrapping_add(invocation)
             .wrapping_sub(lane)
             .wrapping_mul(3u32);
-        let loaded_14 = end;
-        let j = loaded_14.wrapping_sub(lanes).wrapping_add(lane);
+        let loaded_13 = end;
+        let j = loaded_13.wrapping_sub(lanes).wrapping_add(lane);
         if j < count {
-            let _block = machine.block(line!(), 5);
-            let loaded_15 = item;
-            let result_3 = sample_of_polynomial_segment(machine, loaded_15, segment, j, group[2]);
-            let result_4 = parts_1(machine, result_3);
-            all = result_4;
+            let _block = machine.block(line!(), 13);
+            rotation = <[M::F; 4]>::default();
+            let loaded_14 = item.count;
+            let loaded_15 = item.key;
+            if (loaded_14 < NEEDS_CARE) & ((j != 0u32) | (loaded_15 == NO_KEY)) {
+                let _block = machine.block(line!(), 3);
+                let loaded_16 = item;
+                let result_3 =
+                    evaluate_near_polynomial_segment(machine, loaded_16, segment, constant, j);
+                rotation = result_3;
+            } else {
+                let _block = machine.block(line!(), 3);
+                let loaded_17 = item;
+                let result_4 =
+                    sample_of_polynomial_segment(machine, loaded_17, segment, j, group[2]);
+                rotation = result_4;
+            }
+            let loaded_18 = rotation;
+            let result_5 = parts_1(machine, loaded_18);
+            all = result_5;
             part = 0u32;
             loop {
                 let _block = machine.block(line!(), 13);
-                let loaded_16 = part;
-                if !(loaded_16 < 3u32) {
+                let loaded_19 = part;
+                if !(loaded_19 < 3u32) {
                     break;
                 }
-                let loaded_17 = part;
-                let loaded_18 = part;
-                let loaded_19 = all[loaded_18 as usize];
+                let loaded_20 = part;
+                let loaded_21 = part;
+                let loaded_22 = all[loaded_21 as usize];
                 machine.store::<M::F>(
                     Global::Tile,
                     values
                         .wrapping_add(lane.wrapping_mul(3u32))
-                        .wrapping_add(loaded_17) as usize,
-                    loaded_19,
+                        .wrapping_add(loaded_20) as usize,
+                    loaded_22,
                 );
-                let loaded_20 = part;
-                part = loaded_20.wrapping_add(1u32);
+                let loaded_23 = part;
+                part = loaded_23.wrapping_add(1u32);
             }
         }
         barrier().await;
-        let loaded_21 = end;
-        let shift = values.wrapping_add(lanes.wrapping_sub(loaded_21).wrapping_mul(3u32));
-        let loaded_22 = end;
-        let loaded_23 = end;
-        let parts_end = (if count < loaded_23 { count } else { loaded_22 }).wrapping_mul(3u32);
-        let loaded_24 = begin;
-        part_2 = loaded_24.wrapping_mul(3u32).wrapping_add(lane);
-        loop {
-            let _block = machine.block(line!(), 13);
-            let loaded_25 = part_2;
-            if !(loaded_25 < parts_end) {
-                break;
+        let loaded_24 = end;
+        let loaded_25 = begin;
+        let loaded_26 = end;
+        if (loaded_24.wrapping_sub(loaded_25) == line_lanes) & (loaded_26 <= count) {
+            let _block = machine.block(line!(), 6);
+            let found = values.wrapping_add(lane_part);
+            let loaded_27 = begin;
+            let stored = first
+                .wrapping_add(loaded_27)
+                .wrapping_mul(3u32)
+                .wrapping_add(lane_part);
+            part_2 = 0u32;
+            loop {
+                let _block = machine.block(line!(), 14);
+                let loaded_28 = part_2;
+                if !(loaded_28 < 3u32) {
+                    break;
+                }
+                let loaded_29 = part_2;
+                let loaded_30 = part_2;
+                let loaded_31 = machine.load::<M::F>(
+                    Global::Tile,
+                    found.wrapping_add(loaded_30.wrapping_mul(LINE)) as usize,
+                );
+                machine.store::<M::F>(
+                    Global::Rotations,
+                    stored.wrapping_add(loaded_29.wrapping_mul(LINE)) as usize,
+                    loaded_31,
+                );
+                let loaded_32 = part_2;
+                part_2 = loaded_32.wrapping_add(1u32);
             }
-            let loaded_26 = part_2;
-            let loaded_27 = part_2;
-            let loaded_28 =
-                machine.load::<M::F>(Global::Tile, shift.wrapping_add(loaded_27) as usize);
-            machine.store::<M::F>(
-                Global::Rotations,
-                first.wrapping_mul(3u32).wrapping_add(loaded_26) as usize,
-                loaded_28,
-            );
-            let loaded_29 = part_2;
-            part_2 = loaded_29.wrapping_add(lanes);
+        } else {
+            let _block = machine.block(line!(), 13);
+            let loaded_33 = end;
+            let shift = values.wrapping_add(lanes.wrapping_sub(loaded_33).wrapping_mul(3u32));
+            let loaded_34 = end;
+            let loaded_35 = end;
+            let parts_end = (if count < loaded_35 { count } else { loaded_34 }).wrapping_mul(3u32);
+            let loaded_36 = begin;
+            part_3 = loaded_36.wrapping_mul(3u32).wrapping_add(lane);
+            loop {
+                let _block = machine.block(line!(), 13);
+                let loaded_37 = part_3;
+                if !(loaded_37 < parts_end) {
+                    break;
+                }
+                let loaded_38 = part_3;
+                let loaded_39 = part_3;
+                let loaded_40 =
+                    machine.load::<M::F>(Global::Tile, shift.wrapping_add(loaded_39) as usize);
+                machine.store::<M::F>(
+                    Global::Rotations,
+                    first.wrapping_mul(3u32).wrapping_add(loaded_38) as usize,
+                    loaded_40,
+                );
+                let loaded_41 = part_3;
+                part_3 = loaded_41.wrapping_add(lanes);
+            }
         }
-        let loaded_30 = end;
-        begin = loaded_30;
-        let loaded_31 = end;
-        end = loaded_31.wrapping_add(lanes);
-        let loaded_32 = iteration;
-        iteration = loaded_32.wrapping_add(1u32);
+        let loaded_42 = end;
+        begin = loaded_42;
+        let loaded_43 = end;
+        end = loaded_43.wrapping_add(lanes);
+        let loaded_44 = iteration;
+        iteration = loaded_44.wrapping_add(1u32);
+        let loaded_45 = iteration;
+        if loaded_45 >= iterations {
+            break;
+        }
     }
 }
 
@@ -3555,10 +3857,12 @@ pub(crate) async fn main_of_together_5<M: Machine>(machine: &M) {
     let mut begin: u32 = 0u32;
     let mut end: u32 = Default::default();
     let mut iteration: u32 = 0u32;
+    let mut rotation: [M::F; 4] = Default::default();
     let mut all: [M::F; 9] = Default::default();
     let mut part: u32 = Default::default();
     let mut part_2: u32 = Default::default();
-    let _block = machine.block(line!(), 34);
+    let mut part_3: u32 = Default::default();
+    let _block = machine.block(line!(), 41);
     let loaded = machine.load::<u32>(Global::Dispatch, 4);
     let lanes = 1u32 << loaded;
     let workgroup = group[1].wrapping_mul(groups[0]).wrapping_add(group[0]);
@@ -3591,86 +3895,141 @@ pub(crate) async fn main_of_together_5<M: Machine>(machine: &M) {
             location[0]
         },
     );
+    let constant = constant_of_polynomial_segment(machine, segment);
     let loaded_10 = item;
     let count = sample_count(machine, loaded_10);
     let first = location[1];
     let loaded_11 = machine.load::<u32>(Global::Dispatch, 5);
     let idle = first & loaded_11;
     let lane = invocation & lanes.wrapping_sub(1u32);
+    let lane_part = (lane & 0xfffffff8u32)
+        .wrapping_mul(9u32)
+        .wrapping_add(lane & 7u32);
+    let line_lanes = if lanes >= LINE { lanes } else { 0u32 };
     end = lanes.wrapping_sub(idle);
     loop {
-        let _block = machine.block(line!(), 35);
+        let _block = machine.block(line!(), 30);
         let loaded_12 = iteration;
-        if !(loaded_12 < iterations) {
-            break;
-        }
-        let loaded_13 = iteration;
-        let values = (loaded_13 & 1u32)
+        let values = (loaded_12 & 1u32)
             .wrapping_mul(SPREAD_WORKGROUP)
             .wrapping_add(invocation)
             .wrapping_sub(lane)
             .wrapping_mul(9u32);
-        let loaded_14 = end;
-        let j = loaded_14.wrapping_sub(lanes).wrapping_add(lane);
+        let loaded_13 = end;
+        let j = loaded_13.wrapping_sub(lanes).wrapping_add(lane);
         if j < count {
-            let _block = machine.block(line!(), 5);
-            let loaded_15 = item;
-            let result_3 = sample_of_polynomial_segment(machine, loaded_15, segment, j, group[2]);
-            let result_4 = parts_2(machine, result_3);
-            all = result_4;
+            let _block = machine.block(line!(), 13);
+            rotation = <[M::F; 4]>::default();
+            let loaded_14 = item.count;
+            let loaded_15 = item.key;
+            if (loaded_14 < NEEDS_CARE) & ((j != 0u32) | (loaded_15 == NO_KEY)) {
+                let _block = machine.block(line!(), 3);
+                let loaded_16 = item;
+                let result_3 =
+                    evaluate_near_polynomial_segment(machine, loaded_16, segment, constant, j);
+                rotation = result_3;
+            } else {
+                let _block = machine.block(line!(), 3);
+                let loaded_17 = item;
+                let result_4 =
+                    sample_of_polynomial_segment(machine, loaded_17, segment, j, group[2]);
+                rotation = result_4;
+            }
+            let loaded_18 = rotation;
+            let result_5 = parts_2(machine, loaded_18);
+            all = result_5;
             part = 0u32;
             loop {
                 let _block = machine.block(line!(), 13);
-                let loaded_16 = part;
-                if !(loaded_16 < 9u32) {
+                let loaded_19 = part;
+                if !(loaded_19 < 9u32) {
                     break;
                 }
-                let loaded_17 = part;
-                let loaded_18 = part;
-                let loaded_19 = all[loaded_18 as usize];
+                let loaded_20 = part;
+                let loaded_21 = part;
+                let loaded_22 = all[loaded_21 as usize];
                 machine.store::<M::F>(
                     Global::Tile,
                     values
                         .wrapping_add(lane.wrapping_mul(9u32))
-                        .wrapping_add(loaded_17) as usize,
-                    loaded_19,
+                        .wrapping_add(loaded_20) as usize,
+                    loaded_22,
                 );
-                let loaded_20 = part;
-                part = loaded_20.wrapping_add(1u32);
+                let loaded_23 = part;
+                part = loaded_23.wrapping_add(1u32);
             }
         }
         barrier().await;
-        let loaded_21 = end;
-        let shift = values.wrapping_add(lanes.wrapping_sub(loaded_21).wrapping_mul(9u32));
-        let loaded_22 = end;
-        let loaded_23 = end;
-        let parts_end = (if count < loaded_23 { count } else { loaded_22 }).wrapping_mul(9u32);
-        let loaded_24 = begin;
-        part_2 = loaded_24.wrapping_mul(9u32).wrapping_add(lane);
-        loop {
-            let _block = machine.block(line!(), 13);
-            let loaded_25 = part_2;
-            if !(loaded_25 < parts_end) {
-                break;
+        let loaded_24 = end;
+        let loaded_25 = begin;
+        let loaded_26 = end;
+        if (loaded_24.wrapping_sub(loaded_25) == line_lanes) & (loaded_26 <= count) {
+            let _block = machine.block(line!(), 6);
+            let found = values.wrapping_add(lane_part);
+            let loaded_27 = begin;
+            let stored = first
+                .wrapping_add(loaded_27)
+                .wrapping_mul(9u32)
+                .wrapping_add(lane_part);
+            part_2 = 0u32;
+            loop {
+                let _block = machine.block(line!(), 14);
+                let loaded_28 = part_2;
+                if !(loaded_28 < 9u32) {
+                    break;
+                }
+                let loaded_29 = part_2;
+                let loaded_30 = part_2;
+                let loaded_31 = machine.load::<M::F>(
+                    Global::Tile,
+                    found.wrapping_add(loaded_30.wrapping_mul(LINE)) as usize,
+                );
+                machine.store::<M::F>(
+                    Global::Rotations,
+                    stored.wrapping_add(loaded_29.wrapping_mul(LINE)) as usize,
+                    loaded_31,
+                );
+                let loaded_32 = part_2;
+                part_2 = loaded_32.wrapping_add(1u32);
             }
-            let loaded_26 = part_2;
-            let loaded_27 = part_2;
-            let loaded_28 =
-                machine.load::<M::F>(Global::Tile, shift.wrapping_add(loaded_27) as usize);
-            machine.store::<M::F>(
-                Global::Rotations,
-                first.wrapping_mul(9u32).wrapping_add(loaded_26) as usize,
-                loaded_28,
-            );
-            let loaded_29 = part_2;
-            part_2 = loaded_29.wrapping_add(lanes);
+        } else {
+            let _block = machine.block(line!(), 13);
+            let loaded_33 = end;
+            let shift = values.wrapping_add(lanes.wrapping_sub(loaded_33).wrapping_mul(9u32));
+            let loaded_34 = end;
+            let loaded_35 = end;
+            let parts_end = (if count < loaded_35 { count } else { loaded_34 }).wrapping_mul(9u32);
+            let loaded_36 = begin;
+            part_3 = loaded_36.wrapping_mul(9u32).wrapping_add(lane);
+            loop {
+                let _block = machine.block(line!(), 13);
+                let loaded_37 = part_3;
+                if !(loaded_37 < parts_end) {
+                    break;
+                }
+                let loaded_38 = part_3;
+                let loaded_39 = part_3;
+                let loaded_40 =
+                    machine.load::<M::F>(Global::Tile, shift.wrapping_add(loaded_39) as usize);
+                machine.store::<M::F>(
+                    Global::Rotations,
+                    first.wrapping_mul(9u32).wrapping_add(loaded_38) as usize,
+                    loaded_40,
+                );
+                let loaded_41 = part_3;
+                part_3 = loaded_41.wrapping_add(lanes);
+            }
         }
-        let loaded_30 = end;
-        begin = loaded_30;
-        let loaded_31 = end;
-        end = loaded_31.wrapping_add(lanes);
-        let loaded_32 = iteration;
-        iteration = loaded_32.wrapping_add(1u32);
+        let loaded_42 = end;
+        begin = loaded_42;
+        let loaded_43 = end;
+        end = loaded_43.wrapping_add(lanes);
+        let loaded_44 = iteration;
+        iteration = loaded_44.wrapping_add(1u32);
+        let loaded_45 = iteration;
+        if loaded_45 >= iterations {
+            break;
+        }
     }
 }
 
@@ -3682,10 +4041,12 @@ pub(crate) async fn main_of_together_6<M: Machine>(machine: &M) {
     let mut begin: u32 = 0u32;
     let mut end: u32 = Default::default();
     let mut iteration: u32 = 0u32;
+    let mut rotation: [M::F; 4] = Default::default();
     let mut all: [[M::F; 4]; 3] = Default::default();
     let mut part: u32 = Default::default();
     let mut part_2: u32 = Default::default();
-    let _block = machine.block(line!(), 34);
+    let mut part_3: u32 = Default::default();
+    let _block = machine.block(line!(), 41);
     let loaded = machine.load::<u32>(Global::Dispatch, 4);
     let lanes = 1u32 << loaded;
     let workgroup = group[1].wrapping_mul(groups[0]).wrapping_add(group[0]);
@@ -3718,86 +4079,141 @@ pub(crate) async fn main_of_together_6<M: Machine>(machine: &M) {
             location[0]
         },
     );
+    let constant = constant_of_polynomial_segment(machine, segment);
     let loaded_10 = item;
     let count = sample_count(machine, loaded_10);
     let first = location[1];
     let loaded_11 = machine.load::<u32>(Global::Dispatch, 5);
     let idle = first & loaded_11;
     let lane = invocation & lanes.wrapping_sub(1u32);
+    let lane_part = (lane & 0xfffffff8u32)
+        .wrapping_mul(3u32)
+        .wrapping_add(lane & 7u32);
+    let line_lanes = if lanes >= LINE { lanes } else { 0u32 };
     end = lanes.wrapping_sub(idle);
     loop {
-        let _block = machine.block(line!(), 35);
+        let _block = machine.block(line!(), 30);
         let loaded_12 = iteration;
-        if !(loaded_12 < iterations) {
-            break;
-        }
-        let loaded_13 = iteration;
-        let values = (loaded_13 & 1u32)
+        let values = (loaded_12 & 1u32)
             .wrapping_mul(SPREAD_WORKGROUP)
             .wrapping_add(invocation)
             .wrapping_sub(lane)
             .wrapping_mul(3u32);
-        let loaded_14 = end;
-        let j = loaded_14.wrapping_sub(lanes).wrapping_add(lane);
+        let loaded_13 = end;
+        let j = loaded_13.wrapping_sub(lanes).wrapping_add(lane);
         if j < count {
-            let _block = machine.block(line!(), 5);
-            let loaded_15 = item;
-            let result_3 = sample_of_polynomial_segment(machine, loaded_15, segment, j, group[2]);
-            let result_4 = parts_3(machine, result_3);
-            all = result_4;
+            let _block = machine.block(line!(), 13);
+            rotation = <[M::F; 4]>::default();
+            let loaded_14 = item.count;
+            let loaded_15 = item.key;
+            if (loaded_14 < NEEDS_CARE) & ((j != 0u32) | (loaded_15 == NO_KEY)) {
+                let _block = machine.block(line!(), 3);
+                let loaded_16 = item;
+                let result_3 =
+                    evaluate_near_polynomial_segment(machine, loaded_16, segment, constant, j);
+                rotation = result_3;
+            } else {
+                let _block = machine.block(line!(), 3);
+                let loaded_17 = item;
+                let result_4 =
+                    sample_of_polynomial_segment(machine, loaded_17, segment, j, group[2]);
+                rotation = result_4;
+            }
+            let loaded_18 = rotation;
+            let result_5 = parts_3(machine, loaded_18);
+            all = result_5;
             part = 0u32;
             loop {
                 let _block = machine.block(line!(), 13);
-                let loaded_16 = part;
-                if !(loaded_16 < 3u32) {
+                let loaded_19 = part;
+                if !(loaded_19 < 3u32) {
                     break;
                 }
-                let loaded_17 = part;
-                let loaded_18 = part;
-                let loaded_19 = all[loaded_18 as usize];
+                let loaded_20 = part;
+                let loaded_21 = part;
+                let loaded_22 = all[loaded_21 as usize];
                 machine.store::<[M::F; 4]>(
                     Global::Tile,
                     4 * (values
                         .wrapping_add(lane.wrapping_mul(3u32))
-                        .wrapping_add(loaded_17) as usize),
-                    loaded_19,
+                        .wrapping_add(loaded_20) as usize),
+                    loaded_22,
                 );
-                let loaded_20 = part;
-                part = loaded_20.wrapping_add(1u32);
+                let loaded_23 = part;
+                part = loaded_23.wrapping_add(1u32);
             }
         }
         barrier().await;
-        let loaded_21 = end;
-        let shift = values.wrapping_add(lanes.wrapping_sub(loaded_21).wrapping_mul(3u32));
-        let loaded_22 = end;
-        let loaded_23 = end;
-        let parts_end = (if count < loaded_23 { count } else { loaded_22 }).wrapping_mul(3u32);
-        let loaded_24 = begin;
-        part_2 = loaded_24.wrapping_mul(3u32).wrapping_add(lane);
-        loop {
-            let _block = machine.block(line!(), 13);
-            let loaded_25 = part_2;
-            if !(loaded_25 < parts_end) {
-                break;
+        let loaded_24 = end;
+        let loaded_25 = begin;
+        let loaded_26 = end;
+        if (loaded_24.wrapping_sub(loaded_25) == line_lanes) & (loaded_26 <= count) {
+            let _block = machine.block(line!(), 6);
+            let found = values.wrapping_add(lane_part);
+            let loaded_27 = begin;
+            let stored = first
+                .wrapping_add(loaded_27)
+                .wrapping_mul(3u32)
+                .wrapping_add(lane_part);
+            part_2 = 0u32;
+            loop {
+                let _block = machine.block(line!(), 14);
+                let loaded_28 = part_2;
+                if !(loaded_28 < 3u32) {
+                    break;
+                }
+                let loaded_29 = part_2;
+                let loaded_30 = part_2;
+                let loaded_31 = machine.load::<[M::F; 4]>(
+                    Global::Tile,
+                    4 * (found.wrapping_add(loaded_30.wrapping_mul(LINE)) as usize),
+                );
+                machine.store::<[M::F; 4]>(
+                    Global::Rotations,
+                    4 * (stored.wrapping_add(loaded_29.wrapping_mul(LINE)) as usize),
+                    loaded_31,
+                );
+                let loaded_32 = part_2;
+                part_2 = loaded_32.wrapping_add(1u32);
             }
-            let loaded_26 = part_2;
-            let loaded_27 = part_2;
-            let loaded_28 = machine
-                .load::<[M::F; 4]>(Global::Tile, 4 * (shift.wrapping_add(loaded_27) as usize));
-            machine.store::<[M::F; 4]>(
-                Global::Rotations,
-                4 * (first.wrapping_mul(3u32).wrapping_add(loaded_26) as usize),
-                loaded_28,
-            );
-            let loaded_29 = part_2;
-            part_2 = loaded_29.wrapping_add(lanes);
+        } else {
+            let _block = machine.block(line!(), 13);
+            let loaded_33 = end;
+            let shift = values.wrapping_add(lanes.wrapping_sub(loaded_33).wrapping_mul(3u32));
+            let loaded_34 = end;
+            let loaded_35 = end;
+            let parts_end = (if count < loaded_35 { count } else { loaded_34 }).wrapping_mul(3u32);
+            let loaded_36 = begin;
+            part_3 = loaded_36.wrapping_mul(3u32).wrapping_add(lane);
+            loop {
+                let _block = machine.block(line!(), 13);
+                let loaded_37 = part_3;
+                if !(loaded_37 < parts_end) {
+                    break;
+                }
+                let loaded_38 = part_3;
+                let loaded_39 = part_3;
+                let loaded_40 = machine
+                    .load::<[M::F; 4]>(Global::Tile, 4 * (shift.wrapping_add(loaded_39) as usize));
+                machine.store::<[M::F; 4]>(
+                    Global::Rotations,
+                    4 * (first.wrapping_mul(3u32).wrapping_add(loaded_38) as usize),
+                    loaded_40,
+                );
+                let loaded_41 = part_3;
+                part_3 = loaded_41.wrapping_add(lanes);
+            }
         }
-        let loaded_30 = end;
-        begin = loaded_30;
-        let loaded_31 = end;
-        end = loaded_31.wrapping_add(lanes);
-        let loaded_32 = iteration;
-        iteration = loaded_32.wrapping_add(1u32);
+        let loaded_42 = end;
+        begin = loaded_42;
+        let loaded_43 = end;
+        end = loaded_43.wrapping_add(lanes);
+        let loaded_44 = iteration;
+        iteration = loaded_44.wrapping_add(1u32);
+        let loaded_45 = iteration;
+        if loaded_45 >= iterations {
+            break;
+        }
     }
 }
 
@@ -4311,6 +4727,170 @@ pub(crate) async fn main_of_whole_matrices<M: Machine>(machine: &M) {
     }
 }
 
+pub(crate) async fn main_of_subgroup_rotations<M: Machine>(machine: &M) {
+    let group = machine.ids().workgroup_id;
+    let groups = machine.ids().num_workgroups;
+    let subgroup = machine.ids().subgroup_id;
+    let subgroups = machine.ids().num_subgroups;
+    let lane = machine.ids().subgroup_invocation_id;
+    let mut found: u32 = 0u32;
+    let mut count: u32 = Default::default();
+    let mut index: u32 = Default::default();
+    let _block = machine.block(line!(), 85);
+    let loaded = machine.load::<u32>(Global::Dispatch, 5);
+    let first = group[1]
+        .wrapping_mul(groups[0])
+        .wrapping_add(group[0])
+        .wrapping_mul(subgroups)
+        .wrapping_add(subgroup)
+        << loaded;
+    let loaded_2 = machine.load::<u32>(Global::Dispatch, 0);
+    if first >= loaded_2 {
+        return;
+    }
+    let running = ballot(machine, true).await;
+    let lanes = running[0]
+        .count_ones()
+        .wrapping_add(running[1].count_ones());
+    let loaded_3 = machine.load::<u32>(Global::Dispatch, 6);
+    let share_log2 = lanes.wrapping_sub(1u32).count_ones().wrapping_sub(loaded_3);
+    let loaded_4 = machine.load::<u32>(Global::Dispatch, 6);
+    let share_end = lanes.wrapping_sub(1u32) >> loaded_4;
+    let loaded_5 = machine.load::<u32>(Global::Dispatch, 6);
+    let within_share = lane >> loaded_5;
+    let loaded_6 = machine.load::<u32>(Global::Dispatch, 6);
+    let position = lane & (1u32 << loaded_6).wrapping_sub(1u32);
+    let loaded_7 = machine.load::<u32>(Global::Dispatch, 7);
+    let of_position = loaded_7 << position;
+    let loaded_8 = machine.load::<u32>(Global::Dispatch, 5);
+    let instance = position & (1u32 << loaded_8).wrapping_sub(1u32);
+    let loaded_9 = machine.load::<u32>(Global::Dispatch, 0);
+    let rest = loaded_9.wrapping_sub(first);
+    let loaded_10 = machine.load::<u32>(Global::Dispatch, 1);
+    let entry = entry_at(
+        machine,
+        loaded_10
+            .wrapping_add(first)
+            .wrapping_add(if instance >= rest {
+                rest.wrapping_sub(1u32)
+            } else {
+                instance
+            }),
+    );
+    let clip_index = entry.clip_and_weight & 0xffffu32;
+    let clip = clip_at(machine, clip_index);
+    let tick = tick_of(machine, entry, clip.period);
+    let loaded_11 = machine.load::<u32>(Global::Dispatch, 5);
+    let base_index = position >> loaded_11;
+    let base = base_at(
+        machine,
+        clip.first_base.wrapping_add(if base_index < clip.bases {
+            base_index
+        } else {
+            0u32
+        }),
+    );
+    count = base.count;
+    loop {
+        let _block = machine.block(line!(), 39);
+        let loaded_12 = count;
+        let distance = loaded_12.wrapping_add(share_end) >> share_log2;
+        let probe = within_share.wrapping_mul(distance);
+        let loaded_13 = count;
+        let is_inside = probe < loaded_13;
+        let loaded_14 = found;
+        let result = span_of(
+            machine,
+            base.first
+                .wrapping_add(loaded_14)
+                .wrapping_add(if is_inside { probe } else { 0u32 }),
+        );
+        let start = result.start & TICKS;
+        let begun = ballot(
+            machine,
+            (is_inside & (start <= tick)) | (within_share == 0u32),
+        )
+        .await;
+        let begun_count = (begun[0] & of_position)
+            .count_ones()
+            .wrapping_add((begun[1] & of_position).count_ones());
+        let passed = begun_count.wrapping_sub(1u32).wrapping_mul(distance);
+        let loaded_15 = found;
+        found = loaded_15.wrapping_add(passed);
+        let loaded_16 = count;
+        let loaded_17 = count;
+        count = if loaded_17.wrapping_sub(passed) > distance {
+            distance
+        } else {
+            loaded_16.wrapping_sub(passed)
+        };
+        let loaded_18 = count;
+        let go_on = is_any(machine, loaded_18 > 1u32).await;
+        if !go_on {
+            break;
+        }
+    }
+    let loaded_19 = found;
+    let span = span_of(machine, base.first.wrapping_add(loaded_19));
+    let is_key = span.start == tick | ON_KEY;
+    let loaded_20 = machine.load::<u32>(Global::Dispatch, 2);
+    let loaded_21 = found;
+    let result_2 = distance_from_middle(machine, (tick as i32).wrapping_sub(span.whole), 0u32);
+    let in_subgroup = Subgroup {
+        row: clip_index.wrapping_sub(instance).wrapping_mul(loaded_20),
+        span: loaded_21 | (if is_key { ON_KEY } else { 0u32 }),
+        parameter: result_2 * span.scale + span.offset,
+    };
+    let loaded_22 = machine.load::<u32>(Global::Dispatch, 5);
+    let instances = 1u32 << loaded_22;
+    let loaded_23 = machine.load::<u32>(Global::Dispatch, 2);
+    let end = (if rest < instances { rest } else { instances }).wrapping_mul(loaded_23);
+    let loaded_24 = machine.load::<u32>(Global::Dispatch, 2);
+    let output = first.wrapping_mul(loaded_24);
+    let full_end = end & !lanes.wrapping_sub(1u32);
+    index = lane;
+    let loaded_25 = index;
+    let result_3 = is_any(machine, loaded_25 < full_end).await;
+    if result_3 {
+        loop {
+            let _block = machine.block(line!(), 13);
+            let loaded_26 = index;
+            let loaded_27 = index;
+            let result_4 = rotation_at(machine, in_subgroup, loaded_27).await;
+            store(machine, output.wrapping_add(loaded_26), result_4);
+            let loaded_28 = index;
+            index = loaded_28.wrapping_add(lanes);
+            let loaded_29 = index;
+            let go_on_2 = is_any(machine, loaded_29 < full_end).await;
+            if !go_on_2 {
+                break;
+            }
+        }
+    }
+    if full_end < end {
+        let _block = machine.block(line!(), 6);
+        let loaded_30 = index;
+        let is_inside_2 = loaded_30 < end;
+        let loaded_31 = index;
+        let value = rotation_at(
+            machine,
+            in_subgroup,
+            if is_inside_2 { loaded_31 } else { 0u32 },
+        )
+        .await;
+        if is_inside_2 {
+            let _block = machine.block(line!(), 3);
+            let loaded_32 = index;
+            store(machine, output.wrapping_add(loaded_32), value);
+            return;
+        } else {
+            return;
+        }
+    } else {
+        return;
+    }
+}
+
 pub(crate) async fn main_of_prepare_arcs<M: Machine>(machine: &M) {
     let invocation = machine.ids().global_invocation_id;
     let groups = machine.ids().num_workgroups;
@@ -4353,11 +4933,12 @@ pub(crate) fn matrix_rows<M: Machine>(
     detail: u32,
 ) -> MatrixRows<M::F> {
     let mut rows: MatrixRows<M::F> = Default::default();
-    let _block = machine.block(line!(), 31);
-    let v = if detail == 1u32 {
-        [rotation[0], rotation[1], rotation[2]].map(|x| -x)
+    let _block = machine.block(line!(), 30);
+    let v = [rotation[0], rotation[1], rotation[2]];
+    let w = if detail == 1u32 {
+        -rotation[3]
     } else {
-        [rotation[0], rotation[1], rotation[2]]
+        rotation[3]
     };
     let double = both(v, v, |x, y| x + y);
     let xx = v[0] * double[0];
@@ -4366,9 +4947,9 @@ pub(crate) fn matrix_rows<M: Machine>(
     let xy = v[0] * double[1];
     let yz = v[1] * double[2];
     let zx = v[2] * double[0];
-    let wx = rotation[3] * double[0];
-    let wy = rotation[3] * double[1];
-    let wz = rotation[3] * double[2];
+    let wx = w * double[0];
+    let wy = w * double[1];
+    let wz = w * double[2];
     rows.first = [M::F::of(1.0) - (yy + zz), xy - wz, zx + wy];
     rows.second = [xy + wz, M::F::of(1.0) - (xx + zz), yz - wx];
     rows.third = [zx - wy, yz + wx, M::F::of(1.0) - (xx + yy)];
@@ -4376,15 +4957,42 @@ pub(crate) fn matrix_rows<M: Machine>(
     loaded
 }
 
+/// The product of a speed, below 2^23 in units of 2^-16, and a time, below 2^40.
+pub(crate) fn move_of<M: Machine>(machine: &M, speed: u32, time: [u32; 2]) -> CrowdMove {
+    let _block = machine.block(line!(), 25);
+    let speed_low = speed & 0xffffu32;
+    let speed_high = speed >> 16u32;
+    let time_low = time[0] & 0xffffu32;
+    let time_high = time[0] >> 16u32;
+    let parts = speed_low.wrapping_mul(time_low);
+    let first = (parts >> 16u32).wrapping_add(speed_high.wrapping_mul(time_low));
+    let second = speed_low.wrapping_mul(time_high);
+    let far = speed_high
+        .wrapping_mul(time_high)
+        .wrapping_add(speed.wrapping_mul(time[1]));
+    let near = first.wrapping_add(second);
+    let low = near.wrapping_add(far << 16u32);
+    let carried =
+        (if near < first { 1u32 } else { 0u32 }).wrapping_add(if low < near { 1u32 } else { 0u32 });
+    CrowdMove {
+        ticks: [low, (far >> 16u32).wrapping_add(carried)],
+        part: if parts & 0xffffu32 != 0u32 {
+            1u32
+        } else {
+            0u32
+        },
+    }
+}
+
 pub(crate) fn near_distance<M: Machine>(machine: &M, first: i32, j: u32) -> M::F {
-    const OF_KERNELS: [u8; 193] = [
+    const OF_KERNELS: [u8; 194] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => near_distance_of_near_frame(machine, first, j),
@@ -4430,14 +5038,14 @@ pub(crate) fn over<M: Machine>(machine: &M, a: [M::F; 4], b: [M::F; 4], t: M::F)
 }
 
 pub(crate) fn parts_1<M: Machine>(machine: &M, rotation: [M::F; 4]) -> [M::F; 3] {
-    const OF_KERNELS: [u8; 193] = [
+    const OF_KERNELS: [u8; 194] = [
         0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 2, 0, 0, 0,
         0, 0, 1, 0, 2, 0, 0, 0, 0, 0, 1, 0, 2, 0, 0, 0, 0, 0, 1, 0, 2, 0, 0, 0, 0, 0, 1, 0, 0, 0,
         0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 2, 0, 0, 0, 0, 0, 1, 0,
         2, 0, 0, 0, 0, 0, 1, 0, 2, 0, 0, 0, 0, 0, 1, 0, 2, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0,
-        0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0,
-        0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0,
+        0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0,
+        0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => parts_1_of_euler(machine, rotation),
@@ -4467,14 +5075,14 @@ pub(crate) fn parts_1_of_euler_2<M: Machine>(machine: &M, rotation: [M::F; 4]) -
 }
 
 pub(crate) fn parts_2<M: Machine>(machine: &M, rotation: [M::F; 4]) -> [M::F; 9] {
-    const OF_KERNELS: [u8; 193] = [
+    const OF_KERNELS: [u8; 194] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1,
         0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0,
         0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => parts_2_of_matrix3x3(machine, rotation),
@@ -4535,14 +5143,14 @@ pub(crate) fn parts_2_of_matrix3x3_2<M: Machine>(machine: &M, rotation: [M::F; 4
 }
 
 pub(crate) fn parts_3<M: Machine>(machine: &M, rotation: [M::F; 4]) -> [[M::F; 4]; 3] {
-    const OF_KERNELS: [u8; 193] = [
+    const OF_KERNELS: [u8; 194] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0,
         0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => parts_3_of_matrix3x4(machine, rotation),
@@ -4691,14 +5299,14 @@ pub(crate) fn polynomial<M: Machine>(machine: &M, c: [[M::F; 4]; 11], s: M::F) -
 }
 
 pub(crate) fn pose<M: Machine>(machine: &M, sample: u32) {
-    const OF_KERNELS: [u8; 193] = [
+    const OF_KERNELS: [u8; 194] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 2, 3,
         4, 5, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => pose_of_add(machine, sample),
@@ -4920,14 +5528,14 @@ pub(crate) fn pose_of_world<M: Machine>(machine: &M, sample: u32) {
 }
 
 pub(crate) fn position_at<M: Machine>(machine: &M, index: u32) -> CrowdPosition<M::F> {
-    const OF_KERNELS: [u8; 193] = [
+    const OF_KERNELS: [u8; 194] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 2, 2, 2, 2,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 2, 2, 2, 2,
     ];
     match OF_KERNELS[machine.code()] {
         0 => position_at_of_readers(machine, index),
@@ -4995,6 +5603,12 @@ pub(crate) fn reciprocal_root<M: Machine>(machine: &M, x: M::F) -> M::F {
     let first = seed * (M::F::of(1.5) - (half * seed) * seed);
     let second = first * (M::F::of(1.5) - (half * first) * first);
     second * (M::F::of(1.5) - (half * second) * second)
+}
+
+/// x modulo q, for q from 1 on.
+pub(crate) fn remainder<M: Machine>(machine: &M, x: u32, q: u32) -> u32 {
+    let _block = machine.block(line!(), 3);
+    x.wrapping_sub(quotient(x, q).wrapping_mul(q))
 }
 
 pub(crate) fn root<M: Machine>(machine: &M, x: M::F) -> M::F {
@@ -5078,6 +5692,32 @@ pub(crate) fn rotation_added<M: Machine>(
     let result_3 = normalised(machine, result_2);
     let result_4 = canonical(machine, result_3);
     result_4
+}
+
+/// The rotation of a joint, of those of all instances of the subgroup.
+pub(crate) async fn rotation_at<M: Machine>(
+    machine: &M,
+    here: Subgroup<M::F>,
+    index: u32,
+) -> [M::F; 4] {
+    let _block = machine.block(line!(), 14);
+    let loaded = machine.load::<u32>(Global::Dispatch, 8);
+    let instance = index.wrapping_mul(loaded) >> 20u32;
+    let shuffled_value = shuffled(machine, here.row, instance).await;
+    let channel = channel_at(
+        machine,
+        shuffled_value.wrapping_add(index).wrapping_mul(CHANNELS),
+    );
+    let loaded_2 = machine.load::<u32>(Global::Dispatch, 5);
+    let source = ((channel.form_and_base & 0xffffffu32) << loaded_2).wrapping_add(instance);
+    let shuffled_value_2 = shuffled(machine, here.span, source).await;
+    let shuffled_value_3 = shuffled(machine, here.parameter, source).await;
+    let at = CrowdPosition {
+        span: shuffled_value_2,
+        parameter: shuffled_value_3,
+    };
+    let result = arc_value(machine, channel, at);
+    result
 }
 
 pub(crate) fn rotation_between_arcs_hoisted<M: Machine>(
@@ -5252,14 +5892,14 @@ pub(crate) fn row_product<M: Machine>(
 }
 
 pub(crate) fn sample_at_key_sample<M: Machine>(machine: &M, index: u32) -> KeySample<M::F> {
-    const OF_KERNELS: [u8; 193] = [
+    const OF_KERNELS: [u8; 194] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 1, 1, 1, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => sample_at_key_sample_of_readers(machine, index),
@@ -5294,14 +5934,14 @@ pub(crate) fn sample_at_key_sample_of_readers_2<M: Machine>(
 }
 
 pub(crate) fn sample_at_listed_sample<M: Machine>(machine: &M, index: u32) -> ListedSample<M::F> {
-    const OF_KERNELS: [u8; 193] = [
+    const OF_KERNELS: [u8; 194] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1,
-        1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1,
+        1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => sample_at_listed_sample_of_readers(machine, index),
@@ -5481,14 +6121,14 @@ pub(crate) fn sampled<M: Machine>(
 }
 
 pub(crate) fn segment_at_arc_segment<M: Machine>(machine: &M, index: u32) -> ArcSegment<M::F> {
-    const OF_KERNELS: [u8; 193] = [
+    const OF_KERNELS: [u8; 194] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
-        1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
+        1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => segment_at_arc_segment_of_readers(machine, index),
@@ -5524,14 +6164,14 @@ pub(crate) fn segment_at_polynomial_segment<M: Machine>(
     machine: &M,
     index: u32,
 ) -> PolynomialSegment<M::F> {
-    const OF_KERNELS: [u8; 193] = [
+    const OF_KERNELS: [u8; 194] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
-        1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
+        1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => segment_at_polynomial_segment_of_readers(machine, index),
@@ -6064,6 +6704,17 @@ pub(crate) fn span_at<M: Machine>(machine: &M, base: CrowdBase, tick: u32) -> u3
     loaded_7
 }
 
+pub(crate) fn span_of<M: Machine>(machine: &M, index: u32) -> CrowdSpan<M::F> {
+    let _block = machine.block(line!(), 4);
+    let all = machine.load::<[u32; 4]>(Global::Spans, 4 * (index as usize));
+    CrowdSpan {
+        start: all[0],
+        whole: all[1] as i32,
+        scale: M::F::of_bits(all[2]),
+        offset: M::F::of_bits(all[3]),
+    }
+}
+
 /// The vector part of a⁻¹ (a + chord), the step from a to its next key.
 pub(crate) fn step_vector<M: Machine>(machine: &M, a: [M::F; 4], chord: [M::F; 4]) -> [M::F; 3] {
     let _block = machine.block(line!(), 21);
@@ -6075,14 +6726,14 @@ pub(crate) fn step_vector<M: Machine>(machine: &M, a: [M::F; 4], chord: [M::F; 4
 }
 
 pub(crate) fn store<M: Machine>(machine: &M, index: u32, rotation: [M::F; 4]) {
-    const OF_KERNELS: [u8; 193] = [
+    const OF_KERNELS: [u8; 194] = [
         0, 0, 1, 2, 3, 4, 5, 6, 1, 0, 1, 2, 3, 4, 5, 6, 1, 0, 1, 2, 3, 4, 5, 6, 1, 0, 1, 2, 3, 4,
         5, 6, 1, 0, 1, 2, 3, 4, 5, 6, 1, 0, 1, 2, 3, 4, 5, 6, 1, 0, 1, 2, 3, 4, 5, 6, 1, 0, 1, 2,
         3, 4, 5, 6, 1, 0, 1, 2, 3, 4, 5, 6, 1, 0, 1, 2, 3, 4, 5, 6, 1, 0, 1, 2, 3, 4, 5, 6, 1, 0,
         1, 2, 3, 4, 5, 6, 1, 0, 1, 2, 3, 4, 5, 6, 1, 0, 1, 2, 3, 4, 5, 6, 1, 3, 3, 3, 0, 0, 0, 0,
-        0, 0, 3, 3, 3, 3, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 2, 7, 4, 5, 6, 1, 0, 1, 2, 7,
-        4, 5, 6, 1, 0, 1, 2, 7, 4, 5, 6, 1, 0, 1, 2, 7, 4, 5, 6, 1, 0, 1, 2, 7, 4, 5, 6, 1, 0, 1,
-        2, 7, 4, 5, 6, 1, 7, 7, 7, 7, 7, 7, 7,
+        0, 0, 3, 3, 3, 3, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 3, 0, 0, 1, 2, 7, 4, 5, 6, 1, 0, 1, 2,
+        7, 4, 5, 6, 1, 0, 1, 2, 7, 4, 5, 6, 1, 0, 1, 2, 7, 4, 5, 6, 1, 0, 1, 2, 7, 4, 5, 6, 1, 0,
+        1, 2, 7, 4, 5, 6, 1, 7, 7, 7, 7, 7, 7, 7,
     ];
     match OF_KERNELS[machine.code()] {
         0 => store_of_axis_angle(machine, index, rotation),
@@ -6220,14 +6871,14 @@ pub(crate) fn store_with_care<M: Machine>(
     lanes: u32,
     repetition: u32,
 ) {
-    const OF_KERNELS: [u8; 193] = [
+    const OF_KERNELS: [u8; 194] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 1, 0, 1, 1, 0, 0, 1, 0, 1, 0, 1, 1, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => store_with_care_of_alone(machine, item, location, first_j, lanes, repetition),
@@ -6363,10 +7014,25 @@ pub(crate) fn store_with_care_of_alone_2<M: Machine>(
     }
 }
 
-/// The tick of the clip at which a layer stands, from 0 to `period`.
 pub(crate) fn tick_of<M: Machine>(machine: &M, entry: CrowdEntry, period: u32) -> u32 {
-    let mut now: [u32; 2] = Default::default();
-    let _block = machine.block(line!(), 26);
+    const OF_KERNELS: [u8; 194] = [
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+    ];
+    match OF_KERNELS[machine.code()] {
+        0 => tick_of_of_ticks(machine, entry, period),
+        _ => tick_of_of_ticks_2(machine, entry, period),
+    }
+}
+
+/// The tick of the clip at which a layer stands, from 0 to `period`.
+pub(crate) fn tick_of_of_ticks<M: Machine>(machine: &M, entry: CrowdEntry, period: u32) -> u32 {
+    let _block = machine.block(line!(), 41);
     let modes = entry.speed_and_modes;
     let backwards = modes & RUNS_BACKWARDS != 0u32;
     let wrap = (modes >> 29u32) & 3u32;
@@ -6378,64 +7044,149 @@ pub(crate) fn tick_of<M: Machine>(machine: &M, entry: CrowdEntry, period: u32) -
         clock,
         [entry.anchor << 8u32, entry.anchor >> 24u32],
     );
-    let speed = modes & SPEED_MAGNITUDE;
-    let low = wide_product(machine, speed, elapsed[0]);
-    let moved = [
-        low[0],
-        low[1].wrapping_add(speed.wrapping_mul(elapsed[1] & 255u32)),
-    ];
-    let zero = in_parts(machine, START_BIAS);
-    let end = in_parts(machine, period.wrapping_add(START_BIAS));
-    let result = in_parts(machine, entry.start);
-    now = result;
+    let moved = move_of(
+        machine,
+        modes & SPEED_MAGNITUDE,
+        [elapsed[0], elapsed[1] & 255u32],
+    );
+    let ticks = moved.ticks;
+    let part = moved.part;
     if wrap == WRAP_HOLD {
-        let _block = machine.block(line!(), 11);
-        if backwards {
-            let _block = machine.block(line!(), 7);
-            let loaded_3 = now;
-            let result_2 = wide_sum(machine, moved, zero);
-            let held = wide_less(machine, loaded_3, result_2);
-            let loaded_4 = now;
-            let result_3 = wide_difference(machine, loaded_4, moved);
-            now = if held { zero } else { result_3 };
-        } else {
-            let _block = machine.block(line!(), 3);
-            let loaded_5 = now;
-            let result_4 = wide_sum(machine, loaded_5, moved);
-            now = result_4;
-        }
-        let loaded_6 = now;
-        let early = wide_less(machine, loaded_6, zero);
-        let loaded_7 = now;
-        now = if early { zero } else { loaded_7 };
-        let loaded_8 = now;
-        let late = wide_less(machine, end, loaded_8);
-        let loaded_9 = now;
-        now = if late { end } else { loaded_9 };
-    } else {
-        let _block = machine.block(line!(), 15);
-        let whole = in_parts(machine, period << wrap.wrapping_sub(WRAP_LOOP));
-        let along = wide_remainder(machine, moved, whole);
-        let loaded_10 = now;
-        let result_5 = wide_difference(machine, whole, along);
-        let on = wide_sum(machine, loaded_10, if backwards { result_5 } else { along });
-        let result_6 = wide_difference(machine, on, zero);
-        let into = wide_remainder(machine, result_6, whole);
-        let result_7 = wide_sum(machine, into, zero);
-        now = result_7;
-        let loaded_11 = now;
-        let result_8 = wide_less(machine, end, loaded_11);
-        if result_8 {
-            let _block = machine.block(line!(), 5);
-            let result_9 = in_parts(machine, period << 1u32);
-            let result_10 = wide_sum(machine, result_9, zero);
-            let result_11 = wide_difference(machine, result_10, into);
-            now = result_11;
-        }
+        let _block = machine.block(line!(), 1);
+        let result = held_tick(machine, entry.start, ticks, part, backwards, period);
+        return result;
     }
-    let loaded_12 = now;
-    let found = wide_difference(machine, loaded_12, zero);
-    (found[0] >> 16u32) | (found[1] << 16u32)
+    let doubled = wrap.wrapping_sub(WRAP_LOOP);
+    let whole = period << doubled;
+    let half = [
+        (ticks[0] >> doubled) | ((ticks[1] & doubled) << 31u32),
+        ticks[1] >> doubled,
+    ];
+    let result_2 = tick_remainder(machine, half, period);
+    let along = (result_2 << doubled) | (ticks[0] & doubled);
+    let first = entry.start.wrapping_sub(START_BIAS);
+    let start = if first == whole { 0u32 } else { first };
+    let forwards = if backwards {
+        whole.wrapping_sub(along).wrapping_sub(part)
+    } else {
+        along
+    };
+    let room = whole.wrapping_sub(forwards);
+    let into = if start >= room {
+        start.wrapping_sub(room)
+    } else {
+        start.wrapping_add(forwards)
+    };
+    if into.wrapping_add(part) > period {
+        whole.wrapping_sub(into).wrapping_sub(part)
+    } else {
+        into
+    }
+}
+
+/// The tick of the clip at which a layer stands, from 0 to `period`.
+pub(crate) fn tick_of_of_ticks_2<M: Machine>(machine: &M, entry: CrowdEntry, period: u32) -> u32 {
+    let _block = machine.block(line!(), 41);
+    let modes = entry.speed_and_modes;
+    let backwards = modes & RUNS_BACKWARDS != 0u32;
+    let wrap = (modes >> 29u32) & 3u32;
+    let loaded = machine.load::<u32>(Global::Dispatch, 3);
+    let loaded_2 = machine.load::<u32>(Global::Dispatch, 4);
+    let clock = [loaded, loaded_2];
+    let elapsed = wide_difference(
+        machine,
+        clock,
+        [entry.anchor << 8u32, entry.anchor >> 24u32],
+    );
+    let moved = move_of(
+        machine,
+        modes & SPEED_MAGNITUDE,
+        [elapsed[0], elapsed[1] & 255u32],
+    );
+    let ticks = moved.ticks;
+    let part = moved.part;
+    if wrap == WRAP_HOLD {
+        let _block = machine.block(line!(), 1);
+        let result = held_tick(machine, entry.start, ticks, part, backwards, period);
+        return result;
+    }
+    let doubled = wrap.wrapping_sub(WRAP_LOOP);
+    let whole = period << doubled;
+    let half = [
+        (ticks[0] >> doubled) | ((ticks[1] & doubled) << 31u32),
+        ticks[1] >> doubled,
+    ];
+    let result_2 = tick_remainder(machine, half, period);
+    let along = (result_2 << doubled) | (ticks[0] & doubled);
+    let first = entry.start.wrapping_sub(START_BIAS);
+    let start = if first == whole { 0u32 } else { first };
+    let forwards = if backwards {
+        whole.wrapping_sub(along).wrapping_sub(part)
+    } else {
+        along
+    };
+    let room = whole.wrapping_sub(forwards);
+    let into = if start >= room {
+        start.wrapping_sub(room)
+    } else {
+        start.wrapping_add(forwards)
+    };
+    if into.wrapping_add(part) > period {
+        whole.wrapping_sub(into).wrapping_sub(part)
+    } else {
+        into
+    }
+}
+
+/// x modulo q, for x below 2^48 and q from 1 to 2^31.
+pub(crate) fn tick_remainder<M: Machine>(machine: &M, x: [u32; 2], q: u32) -> u32 {
+    let mut digit: u32 = 16u32;
+    let mut rest: u32 = Default::default();
+    let mut low: u32 = Default::default();
+    let mut left: u32 = 32u32;
+    let _block = machine.block(line!(), 6);
+    if x[1] == 0u32 {
+        let _block = machine.block(line!(), 1);
+        let result = remainder(machine, x[0], q);
+        return result;
+    }
+    loop {
+        let _block = machine.block(line!(), 9);
+        let loaded = digit;
+        if !(q.wrapping_sub(1u32) >> 32u32.wrapping_sub(loaded) != 0u32) {
+            break;
+        }
+        let loaded_2 = digit;
+        digit = loaded_2 >> 1u32;
+    }
+    let result_2 = remainder(machine, x[1], q);
+    rest = result_2;
+    low = x[0];
+    loop {
+        let _block = machine.block(line!(), 21);
+        let loaded_3 = left;
+        if !(loaded_3 != 0u32) {
+            break;
+        }
+        let loaded_4 = rest;
+        let loaded_5 = digit;
+        let loaded_6 = low;
+        let loaded_7 = digit;
+        let result_3 = remainder(
+            machine,
+            (loaded_4 << loaded_5) | (loaded_6 >> 32u32.wrapping_sub(loaded_7)),
+            q,
+        );
+        rest = result_3;
+        let loaded_8 = low;
+        let loaded_9 = digit;
+        low = loaded_8 << loaded_9;
+        let loaded_10 = left;
+        let loaded_11 = digit;
+        left = loaded_10.wrapping_sub(loaded_11);
+    }
+    let loaded_12 = rest;
+    loaded_12
 }
 
 /// As `to_half`, for values of any magnitude.
@@ -6606,14 +7357,14 @@ pub(crate) fn walk<M: Machine>(machine: &M, instance: u32, link: CrowdLink) {
 }
 
 pub(crate) fn weights_at<M: Machine>(machine: &M, index: u32) -> TangentWeights<M::F> {
-    const OF_KERNELS: [u8; 193] = [
+    const OF_KERNELS: [u8; 194] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => weights_at_of_readers(machine, index),
@@ -6650,103 +7401,13 @@ pub(crate) fn wide<M: Machine>(machine: &M, rotation: [M::F; 4]) -> [u64; 2] {
     ]
 }
 
+/// Whole numbers of 64 bits: the lower word, the upper word.
 pub(crate) fn wide_difference<M: Machine>(machine: &M, a: [u32; 2], b: [u32; 2]) -> [u32; 2] {
     let _block = machine.block(line!(), 5);
     [
         a[0].wrapping_sub(b[0]),
         a[1].wrapping_sub(b[1])
             .wrapping_sub(if a[0] < b[0] { 1u32 } else { 0u32 }),
-    ]
-}
-
-/// Whole numbers of 64 bits: the lower word, the upper word.
-pub(crate) fn wide_less<M: Machine>(machine: &M, a: [u32; 2], b: [u32; 2]) -> bool {
-    let _block = machine.block(line!(), 4);
-    if a[1] != b[1] {
-        a[1] < b[1]
-    } else {
-        a[0] < b[0]
-    }
-}
-
-/// The product of two numbers of 32 bits.
-pub(crate) fn wide_product<M: Machine>(machine: &M, a: u32, b: u32) -> [u32; 2] {
-    let _block = machine.block(line!(), 22);
-    let al = a & 0xffffu32;
-    let ah = a >> 16u32;
-    let bl = b & 0xffffu32;
-    let bh = b >> 16u32;
-    let low = al.wrapping_mul(bl);
-    let left = ah.wrapping_mul(bl);
-    let right = al.wrapping_mul(bh);
-    let middle = (low >> 16u32)
-        .wrapping_add(left & 0xffffu32)
-        .wrapping_add(right & 0xffffu32);
-    let high = ah
-        .wrapping_mul(bh)
-        .wrapping_add(left >> 16u32)
-        .wrapping_add(right >> 16u32)
-        .wrapping_add(middle >> 16u32);
-    [(low & 0xffffu32) | (middle << 16u32), high]
-}
-
-/// x modulo q, for x below 2^63 and q from 1 on: multiples of q by powers of 2 are taken away.
-pub(crate) fn wide_remainder<M: Machine>(machine: &M, x: [u32; 2], q: [u32; 2]) -> [u32; 2] {
-    let mut rest: [u32; 2] = Default::default();
-    let mut multiple: [u32; 2] = Default::default();
-    let _block = machine.block(line!(), 3);
-    rest = x;
-    multiple = q;
-    loop {
-        let _block = machine.block(line!(), 16);
-        let loaded = rest;
-        let loaded_2 = multiple;
-        let result = wide_less(machine, loaded, loaded_2);
-        let loaded_3 = multiple[1];
-        if !(!result & (loaded_3 < 0x40000000u32)) {
-            break;
-        }
-        let loaded_4 = multiple[0];
-        let loaded_5 = multiple[1];
-        let loaded_6 = multiple[0];
-        multiple = [loaded_4 << 1u32, (loaded_5 << 1u32) | (loaded_6 >> 31u32)];
-    }
-    loop {
-        let _block = machine.block(line!(), 17);
-        let loaded_7 = multiple;
-        let result_2 = wide_less(machine, loaded_7, q);
-        if !!result_2 {
-            break;
-        }
-        let loaded_8 = rest;
-        let loaded_9 = multiple;
-        let result_3 = wide_less(machine, loaded_8, loaded_9);
-        if !result_3 {
-            let _block = machine.block(line!(), 4);
-            let loaded_10 = rest;
-            let loaded_11 = multiple;
-            let result_4 = wide_difference(machine, loaded_10, loaded_11);
-            rest = result_4;
-        }
-        let loaded_12 = multiple[0];
-        let loaded_13 = multiple[1];
-        let loaded_14 = multiple[1];
-        multiple = [
-            (loaded_12 >> 1u32) | (loaded_13 << 31u32),
-            loaded_14 >> 1u32,
-        ];
-    }
-    let loaded_15 = rest;
-    loaded_15
-}
-
-pub(crate) fn wide_sum<M: Machine>(machine: &M, a: [u32; 2], b: [u32; 2]) -> [u32; 2] {
-    let _block = machine.block(line!(), 5);
-    let low = a[0].wrapping_add(b[0]);
-    [
-        low,
-        a[1].wrapping_add(b[1])
-            .wrapping_add(if low < a[0] { 1u32 } else { 0u32 }),
     ]
 }
 

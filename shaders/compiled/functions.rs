@@ -387,10 +387,11 @@ pub(crate) fn matrix_rows(rotation: [f32; 4], detail: u32) -> MatrixRows<f32> {
         second: [0.0; 3],
         third: [0.0; 3],
     };
-    let v = if detail == 1 {
-        [-rotation[0], -rotation[1], -rotation[2]]
+    let v = [rotation[0], rotation[1], rotation[2]];
+    let w = if detail == 1 {
+        -rotation[3]
     } else {
-        [rotation[0], rotation[1], rotation[2]]
+        rotation[3]
     };
     let double = [v[0] + v[0], v[1] + v[1], v[2] + v[2]];
     let xx = v[0] * double[0];
@@ -399,9 +400,9 @@ pub(crate) fn matrix_rows(rotation: [f32; 4], detail: u32) -> MatrixRows<f32> {
     let xy = v[0] * double[1];
     let yz = v[1] * double[2];
     let zx = v[2] * double[0];
-    let wx = rotation[3] * double[0];
-    let wy = rotation[3] * double[1];
-    let wz = rotation[3] * double[2];
+    let wx = w * double[0];
+    let wy = w * double[1];
+    let wz = w * double[2];
     rows.first = [1.0 - (yy + zz), xy - wz, zx + wy];
     rows.second = [xy + wz, 1.0 - (xx + zz), yz - wx];
     rows.third = [zx - wy, yz + wx, 1.0 - (xx + yy)];

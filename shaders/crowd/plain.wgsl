@@ -6,16 +6,6 @@ const ROTATION: u32 = 0;
 const TRANSLATION: u32 = 1;
 const SCALE: u32 = 2;
 
-// An arc where its time base stands. The first cell is 0: a constant is an arc without a tangent.
-fn arc_value(channel: CrowdChannel, at: CrowdPosition) -> vec4f {
-    let is_key = (at.span & ON_KEY) != 0u;
-    let along = (at.span & TICKS) * channel.count;
-    let middle = channel.first + along * 2u;
-    let key_or_first = cell_at(select(middle, channel.keys + along, is_key));
-    let tangent = cell_at(select(middle + channel.count, 0u, channel.count == 0u));
-    return select(canonical(evaluate(Segment(key_or_first, tangent), at.parameter)), key_or_first, is_key);
-}
-
 // A cubic likewise.
 fn cubic_value(channel: CrowdChannel, at: CrowdPosition) -> vec4f {
     let is_key = (at.span & ON_KEY) != 0u;

@@ -1,4 +1,4 @@
-// The tick of its clip at which a layer is, and the span there, by integers alone.
+// The tick of its clip at which a layer is, by integers alone.
 // Twin: src/twin/crowd_times.rs.
 
 // Added to every start, so that none is negative.
@@ -10,52 +10,69 @@ const WRAP_LOOP: u32 = 1;
 const WRAP_MIRROR: u32 = 2;
 
 // Whole numbers of 64 bits: the lower word, the upper word.
-fn wide_less(a: vec2u, b: vec2u) -> bool {
-    return select(a.x < b.x, a.y < b.y, a.y != b.y);
-}
-
-fn wide_sum(a: vec2u, b: vec2u) -> vec2u {
-    let low = a.x + b.x;
-    return vec2u(low, a.y + b.y + select(0u, 1u, low < a.x));
-}
-
 fn wide_difference(a: vec2u, b: vec2u) -> vec2u {
     return vec2u(a.x - b.x, a.y - b.y - select(0u, 1u, a.x < b.x));
 }
 
-// The product of two numbers of 32 bits.
-fn wide_product(a: u32, b: u32) -> vec2u {
-    let al = a & 0xffffu;
-    let ah = a >> 16u;
-    let bl = b & 0xffffu;
-    let bh = b >> 16u;
-    let low = al * bl;
-    let left = ah * bl;
-    let right = al * bh;
-    let middle = (low >> 16u) + (left & 0xffffu) + (right & 0xffffu);
-    let high = ah * bh + (left >> 16u) + (right >> 16u) + (middle >> 16u);
-    return vec2u((low & 0xffffu) | (middle << 16u), high);
+// How far a layer has moved: whole ticks, below 2^48, and 1 if it is a part of a tick more.
+struct CrowdMove {
+    ticks: vec2u,
+    part: u32,
 }
 
-// x modulo q, for x below 2^63 and q from 1 on: multiples of q by powers of 2 are taken away.
-fn wide_remainder(x: vec2u, q: vec2u) -> vec2u {
-    var rest = x;
-    var multiple = q;
-    while !wide_less(rest, multiple) & (multiple.y < 0x40000000u) {
-        multiple = vec2u(multiple.x << 1u, (multiple.y << 1u) | (multiple.x >> 31u));
+// The product of a speed, below 2^23 in units of 2^-16, and a time, below 2^40.
+fn move_of(speed: u32, time: vec2u) -> CrowdMove {
+    let speed_low = speed & 0xffffu;
+    let speed_high = speed >> 16u;
+    let time_low = time.x & 0xffffu;
+    let time_high = time.x >> 16u;
+    let parts = speed_low * time_low;
+    let first = (parts >> 16u) + speed_high * time_low;
+    let second = speed_low * time_high;
+    // In units of 2^16 ticks.
+    let far = speed_high * time_high + speed * time.y;
+    let near = first + second;
+    let low = near + (far << 16u);
+    let carried = select(0u, 1u, near < first) + select(0u, 1u, low < near);
+    return CrowdMove(vec2u(low, (far >> 16u) + carried), select(0u, 1u, (parts & 0xffffu) != 0u));
+}
+
+// x modulo q, for q from 1 on.
+fn remainder(x: u32, q: u32) -> u32 {
+    return x - (x / q) * q;
+}
+
+// x modulo q, for x below 2^48 and q from 1 to 2^31.
+fn tick_remainder(x: vec2u, q: u32) -> u32 {
+    if x.y == 0u {
+        return remainder(x.x, q);
     }
-    while !wide_less(multiple, q) {
-        if !wide_less(rest, multiple) {
-            rest = wide_difference(rest, multiple);
-        }
-        multiple = vec2u((multiple.x >> 1u) | (multiple.y << 31u), multiple.y >> 1u);
+    // At least an hour and a half of the clock. The lower word is brought down by digits, of as many bits as fit beside
+    // a remainder.
+    var digit = 16u;
+    while ((q - 1u) >> (32u - digit)) != 0u {
+        digit = digit >> 1u;
+    }
+    var rest = remainder(x.y, q);
+    var low = x.x;
+    for (var left = 32u; left != 0u; left -= digit) {
+        rest = remainder((rest << digit) | (low >> (32u - digit)), q);
+        low = low << digit;
     }
     return rest;
 }
 
-// A number of ticks in units of 2^-16.
-fn in_parts(ticks: u32) -> vec2u {
-    return vec2u(ticks << 16u, ticks >> 16u);
+// The tick at which a layer stands that does not go on behind an end of its clip. It has moved by `ticks` and, if
+// `part` is 1, a part of one more.
+fn held_tick(start: u32, ticks: vec2u, part: u32, backwards: bool, period: u32) -> u32 {
+    let end = period + START_BIAS;
+    let later = start + ticks.x;
+    let earlier = start - ticks.x - part;
+    // Where it is beyond what 32 bits can say.
+    let is_beyond = (ticks.y != 0u) | select(later < start, start <= ticks.x, backwards);
+    let moved = select(later, earlier, backwards);
+    let tick = select(moved, select(end, 0u, backwards), is_beyond);
+    return select(select(tick, end, tick > end), START_BIAS, tick < START_BIAS) - START_BIAS;
 }
 
 // The tick of the clip at which a layer stands, from 0 to `period`.
@@ -65,46 +82,23 @@ fn tick_of(entry: CrowdEntry, period: u32) -> u32 {
     let wrap = (modes >> 29u) & 3u;
     let clock = vec2u(dispatch.clock_low, dispatch.clock_high);
     let elapsed = wide_difference(clock, vec2u(entry.anchor << 8u, entry.anchor >> 24u));
-    let speed = modes & SPEED_MAGNITUDE;
-    let low = wide_product(speed, elapsed.x);
-    let moved = vec2u(low.x, low.y + speed * (elapsed.y & 0xffu));
-    let zero = in_parts(START_BIAS);
-    let end = in_parts(period + START_BIAS);
-    var now = in_parts(entry.start);
+    let moved = move_of(modes & SPEED_MAGNITUDE, vec2u(elapsed.x, elapsed.y & 0xffu));
+    let ticks = moved.ticks;
+    let part = moved.part;
     if wrap == WRAP_HOLD {
-        if backwards {
-            let held = wide_less(now, wide_sum(moved, zero));
-            now = select(wide_difference(now, moved), zero, held);
-        } else {
-            now = wide_sum(now, moved);
-        }
-        let early = wide_less(now, zero);
-        now = select(now, zero, early);
-        let late = wide_less(end, now);
-        now = select(now, end, late);
-    } else {
-        // One period forwards, or one there and back.
-        let whole = in_parts(period << (wrap - WRAP_LOOP));
-        let along = wide_remainder(moved, whole);
-        let on = wide_sum(now, select(along, wide_difference(whole, along), backwards));
-        let into = wide_remainder(wide_difference(on, zero), whole);
-        now = wide_sum(into, zero);
-        if wide_less(end, now) {
-            now = wide_difference(wide_sum(in_parts(period << 1u), zero), into);
-        }
+        return held_tick(entry.start, ticks, part, backwards, period);
     }
-    let found = wide_difference(now, zero);
-    return (found.x >> 16u) | (found.y << 16u);
-}
-
-// The last span of a time base that does not start after a tick.
-fn span_at(base: CrowdBase, tick: u32) -> u32 {
-    var found = 0u;
-    for (var step = base.step; step != 0u; step = step >> 1u) {
-        let next = found + step;
-        let inside = next < base.count;
-        let start = spans[base.first + select(0u, next, inside)].start & TICKS;
-        found = select(found, next, inside & (tick >= start));
-    }
-    return found;
+    // One period forwards, or one there and back, of which the division has half.
+    let doubled = wrap - WRAP_LOOP;
+    let whole = period << doubled;
+    let half = vec2u((ticks.x >> doubled) | ((ticks.y & doubled) << 31u), ticks.y >> doubled);
+    let along = (tick_remainder(half, period) << doubled) | (ticks.x & doubled);
+    let first = entry.start - START_BIAS;
+    let start = select(first, 0u, first == whole);
+    let forwards = select(along, whole - along - part, backwards);
+    // Without a sum that 32 bits may not hold.
+    let room = whole - forwards;
+    let into = select(start + forwards, start - room, start >= room);
+    // Behind the end it comes back.
+    return select(into, whole - into - part, into + part > period);
 }

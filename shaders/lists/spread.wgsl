@@ -55,6 +55,9 @@ const NEEDS_CARE: u32 = 0x40000000;
 
 const NO_KEY: u32 = 0xffffffff;
 
+// Neighbours that store one line of 128 bytes, where a rotation has 16.
+const LINE: u32 = 8;
+
 var<immediate> dispatch: Spread;
 
 // Where a run of a repetition finds its segment (x) and its key (z), and stores its first sample (y).
@@ -71,6 +74,12 @@ fn constant_of_run(index: u32, repetition: u32) -> vec4f {
 
 fn sample_count(item: SpreadRun) -> u32 {
     return item.count & ~(IS_CONSTANT | NEEDS_CARE);
+}
+
+// The value at the `j`th sample of a run that needs no care and has no key there. `constant` is its segment's.
+fn evaluate_near(item: SpreadRun, segment: Segment, constant: f32, j: u32) -> vec4f {
+    let parameter = near_distance(item.first, j) * item.scale + item.offset;
+    return evaluate_with(segment, constant, parameter);
 }
 
 // The value of any run at its `j`th sample.

@@ -9,7 +9,9 @@ struct MatrixRows {
 }
 
 fn matrix_rows(rotation: vec4f, detail: u32) -> MatrixRows {
-    let v = select(rotation.xyz, -rotation.xyz, detail == 1u);
+    let v = rotation.xyz;
+    // The inverse of a rotation, with the other sign.
+    let w = select(rotation.w, -rotation.w, detail == 1u);
     let double = v + v;
     let xx = v.x * double.x;
     let yy = v.y * double.y;
@@ -17,9 +19,9 @@ fn matrix_rows(rotation: vec4f, detail: u32) -> MatrixRows {
     let xy = v.x * double.y;
     let yz = v.y * double.z;
     let zx = v.z * double.x;
-    let wx = rotation.w * double.x;
-    let wy = rotation.w * double.y;
-    let wz = rotation.w * double.z;
+    let wx = w * double.x;
+    let wy = w * double.y;
+    let wz = w * double.z;
     var rows: MatrixRows;
     rows.first = vec3f(1.0 - (yy + zz), xy - wz, zx + wy);
     rows.second = vec3f(xy + wz, 1.0 - (xx + zz), yz - wx);

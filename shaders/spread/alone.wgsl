@@ -66,11 +66,6 @@ fn main(
     }
 }
 
-fn evaluate_near(item: SpreadRun, segment: Segment, constant: f32, j: u32) -> vec4f {
-    let parameter = near_distance(item.first, j) * item.scale + item.offset;
-    return evaluate_with(segment, constant, parameter);
-}
-
 // A constant, or a run whose samples are not all simple, which is rare.
 fn store_with_care(
     item: SpreadRun,

@@ -137,11 +137,10 @@ impl DeviceCrowd {
     /// The kernels for a result.
     pub(crate) fn kernels(&self, output: CrowdOutput) -> FrameKernels {
         let device = &self.engine.device;
-        let binds =
-            |kernel| Pipeline::storage_buffers(device, kernel) <= device.physical.storage_buffers;
         let properties = CrowdDevice {
             maps_samples: self.engine.maps_samples,
-            binds: &binds,
+            subgroup_lanes: device.physical.subgroup_lanes,
+            runs: &|kernel| Pipeline::can_run(device, kernel),
         };
         FrameKernels::new(&self.tables.shape, output, &properties)
     }
@@ -423,9 +422,14 @@ mod tests {
     fn a_frame_of_small_instances_is_one_kernel_on_cards() {
         use CrowdValues::{Local, Model, Rotations, Skinning};
         for crowd in crowd(Mapping::Samples, 128, 1, false) {
+            let on_device = VulkanCrowd::of(&**crowd.device.as_ref().unwrap()).unwrap();
+            let lanes = on_device.device.engine.device.physical.subgroup_lanes;
+            let by_subgroups = ["crowd_subgroup_rotations"];
+            let by_workgroups = ["crowd_plain_whole_rotations"];
+            let expected = if lanes.is_some() { by_subgroups } else { by_workgroups };
+            assert_eq!(kernels(&crowd, Rotations.into()), expected);
+            assert_eq!(kernels(&crowd, CrowdOutput::half(Rotations)), by_workgroups);
             for output in [CrowdOutput::from, CrowdOutput::half] {
-                let rotations = ["crowd_plain_whole_rotations"];
-                assert_eq!(kernels(&crowd, output(Rotations)), rotations);
                 for values in [Local, Model, Skinning] {
                     let matrices = ["crowd_plain_whole_matrices"];
                     assert_eq!(kernels(&crowd, output(values)), matrices);

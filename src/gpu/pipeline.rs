@@ -57,6 +57,14 @@ impl Pipeline {
         }
     }
 
+    /// Whether a kernel runs on a device: it binds no more storage buffers than the device allows, and subgroups can do
+    /// all that it needs.
+    pub(crate) fn can_run(device: &LogicalDevice, kernel: Kernel) -> bool {
+        let physical = &device.physical;
+        Self::storage_buffers(device, kernel) <= physical.storage_buffers
+            && (!kernel.compiled().subgroups || physical.subgroup_lanes.is_some())
+    }
+
     /// The hash of a kernel's code on this device.
     pub(crate) fn code_hash(device: &LogicalDevice, kernel: Kernel) -> u64 {
         let (_, code, _) = kernel.code(device.variants());

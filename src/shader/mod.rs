@@ -58,6 +58,8 @@ pub(crate) struct KernelCode {
     pub(crate) bindings: &'static [Access],
     /// For kernels that evaluate segments: the form, the kind of work list, and the stored encoding.
     pub(crate) segments: Option<(Form, List, Store)>,
+    /// Whether the lanes of its subgroups ask each other, which not every device can.
+    pub(crate) subgroups: bool,
 }
 
 /// The variants of kernels that a device takes where they are.

@@ -1,5 +1,6 @@
 //! Twin of `shaders/crowd/cubic.wgsl`, `shaders/crowd/sampled.wgsl`, `shaders/crowd/layers.wgsl`,
-//! `shaders/crowd/plain.wgsl` and `shaders/crowd/rotations.wgsl`: the same names, the same order.
+//! `shaders/crowd/plain.wgsl`, `shaders/crowd/plain_arc.wgsl` and `shaders/crowd/rotations.wgsl`: the same names, the
+//! same order.
 
 use glam::Vec4;
 

@@ -1,5 +1,5 @@
-//! Twin of `shaders/crowd/ticks.wgsl`, `shaders/crowd/times.wgsl` and `shaders/crowd/entry.wgsl`: the same names, with
-//! the whole numbers of 64 bits that the shader makes of two words.
+//! Twin of `shaders/crowd/ticks.wgsl`, `shaders/crowd/span_search.wgsl`, `shaders/crowd/times.wgsl` and
+//! `shaders/crowd/entry.wgsl`: the same results, by whole numbers of 64 bits, where the shaders have words of 32.
 
 use crate::shader::{
     CrowdBase, CrowdClip, CrowdEntry, CrowdPosition, CrowdSpan, ON_KEY, RUNS_BACKWARDS,

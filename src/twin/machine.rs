@@ -180,7 +180,13 @@ pub(crate) struct InvocationIds {
     pub(crate) workgroup_id: [u32; 3],
     pub(crate) num_workgroups: [u32; 3],
     pub(crate) local_invocation_index: u32,
+    pub(crate) subgroup_id: u32,
+    pub(crate) num_subgroups: u32,
+    pub(crate) subgroup_invocation_id: u32,
 }
+
+/// The lanes of a subgroup, if nothing else is said. No result depends on it.
+const SUBGROUP_LANES: u32 = 32;
 
 /// The machine on which an invocation of a kernel runs: its indices and its memory.
 pub(crate) trait Machine {
@@ -202,6 +208,12 @@ pub(crate) trait Machine {
 
     /// Begins a block of so many operations, in a line of the generated file.
     fn block(&self, line: u32, steps: usize) -> Self::Block;
+
+    /// Shows a word to the other lanes of the subgroup, or nothing more.
+    fn show(&self, word: Option<u32>);
+
+    /// The word that a lane of the subgroup shows.
+    fn shown(&self, lane: u32) -> Option<u32>;
 }
 
 /// Sees what an invocation does. `()` looks away.
@@ -237,6 +249,10 @@ pub(crate) struct Memory {
     /// The variable in whose memory each lies.
     aliases: [Global; GLOBALS],
     output: Global,
+    /// The lanes of a subgroup.
+    subgroup_lanes: u32,
+    /// The words that the invocations of the workgroup show to others of their subgroups.
+    shown: RefCell<Vec<Option<u32>>>,
 }
 
 impl Memory {
@@ -255,6 +271,8 @@ impl Memory {
             variables: vec![RefCell::default(); GLOBALS],
             aliases: Global::ALL,
             output: outputs[0],
+            subgroup_lanes: SUBGROUP_LANES,
+            shown: RefCell::default(),
         };
         for (&global, input) in inputs_bound.iter().zip(inputs) {
             memory.fill(global, input);
@@ -289,6 +307,15 @@ impl Memory {
         texels.is_some()
     }
 
+    /// Runs subgroups of so many lanes, a power of two, from now on.
+    #[cfg(test)]
+    pub(crate) fn with_subgroups_of(self, subgroup_lanes: u32) -> Self {
+        Self {
+            subgroup_lanes,
+            ..self
+        }
+    }
+
     /// Whether a buffer lies there, not memory of a workgroup, nor what comes with a dispatch.
     #[cfg(test)]
     pub(crate) fn is_buffer(&self, global: Global) -> bool {
@@ -303,6 +330,9 @@ impl Memory {
             workgroup_id: [0; 3],
             num_workgroups: [1; 3],
             local_invocation_index: 0,
+            subgroup_id: 0,
+            num_subgroups: 1,
+            subgroup_invocation_id: 0,
         };
         Invocation {
             memory: self,
@@ -342,6 +372,7 @@ impl Memory {
                 variable.borrow_mut().clear();
             }
         }
+        *self.shown.borrow_mut() = vec![None; *workgroup as usize];
         let invocations: Vec<_> = (0..*workgroup)
             .map(|lane| Invocation::<F, W> {
                 memory: self,
@@ -350,6 +381,9 @@ impl Memory {
                     workgroup_id: group,
                     num_workgroups: groups,
                     local_invocation_index: lane,
+                    subgroup_id: lane / self.subgroup_lanes,
+                    num_subgroups: workgroup.div_ceil(self.subgroup_lanes),
+                    subgroup_invocation_id: lane % self.subgroup_lanes,
                 },
                 private: RefCell::default(),
                 watch: watch(lane),
@@ -378,6 +412,37 @@ pub(crate) async fn barrier() {
         false => Poll::Pending,
     });
     pin!(wait).await;
+}
+
+/// A bit for each lane of the subgroup that runs and whose condition holds, the lowest for the first lane.
+pub(crate) async fn ballot(machine: &impl Machine, condition: bool) -> [u32; 4] {
+    machine.show(Some(condition.into()));
+    barrier().await;
+    let word = |i: u32| {
+        let lanes = (0..u32::BITS).filter(|bit| machine.shown(32 * i + bit) == Some(1));
+        lanes.map(|bit| 1 << bit).sum()
+    };
+    let found = [0, 1, 2, 3].map(word);
+    hide(machine).await;
+    found
+}
+
+/// The value of a lane of the subgroup.
+pub(crate) async fn shuffled<T: Stored>(machine: &impl Machine, value: T, lane: u32) -> T {
+    const { assert!(T::WORDS == 1) };
+    let mut word = [0];
+    value.put(&mut word);
+    machine.show(Some(word[0]));
+    barrier().await;
+    let found = machine.shown(lane).unwrap_or(UNTOUCHED);
+    hide(machine).await;
+    T::of_words(&[found])
+}
+
+/// Waits until all lanes have seen what the others show, and shows nothing more.
+async fn hide(machine: &impl Machine) {
+    barrier().await;
+    machine.show(None);
 }
 
 /// One invocation of a kernel.
@@ -453,5 +518,17 @@ impl<F: Float, W: Watch> Machine for Invocation<'_, F, W> {
 
     fn block(&self, line: u32, steps: usize) -> W::Block {
         self.watch.block(line, steps)
+    }
+
+    fn show(&self, word: Option<u32>) {
+        let invocation = self.ids.local_invocation_index;
+        self.memory.shown.borrow_mut()[invocation as usize] = word;
+    }
+
+    fn shown(&self, lane: u32) -> Option<u32> {
+        let invocation = self.ids.subgroup_id * self.memory.subgroup_lanes + lane;
+        let is_lane = lane < self.memory.subgroup_lanes;
+        let shown = self.memory.shown.borrow();
+        (*shown.get(invocation as usize)?).filter(|_| is_lane)
     }
 }

@@ -6,6 +6,7 @@ use crate::shader::{
     CROWD_WORKGROUP, CrowdDispatch, CrowdEntry, CrowdPosition, Kernel, MAX_WALKED, WORKGROUP,
 };
 use crate::work::recording::{Recording, Resource, Set, Slice, workgroups};
+use crate::work::subgroup_instances::SubgroupInstances;
 use crate::work::whole_instances::WholeInstances;
 
 /// The skeleton and the clips of a crowd, as far as its dispatches depend on them.
@@ -42,15 +43,48 @@ pub(crate) struct CrowdDevice<'a> {
     /// Whether neighbouring invocations run at once. Software devices run those of a workgroup one after another, and
     /// stop at each barrier.
     pub(crate) maps_samples: bool,
-    /// Whether the device can bind all that a kernel reads.
-    pub(crate) binds: &'a dyn Fn(Kernel) -> bool,
+    /// The lanes of its subgroups, if they can do all that kernels need.
+    pub(crate) subgroup_lanes: Option<u32>,
+    /// Whether the device can run a kernel.
+    pub(crate) runs: &'a dyn Fn(Kernel) -> bool,
+}
+
+/// How instances are evaluated as wholes, by one kernel for all steps.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum WholeKernel {
+    Subgroups(SubgroupInstances),
+    Workgroups(WholeInstances),
+}
+
+impl WholeKernel {
+    /// That of a device, if it has one: by subgroups where it can.
+    fn new(
+        arguments: &CrowdDispatch,
+        output: CrowdOutput,
+        is_plain: bool,
+        device: &CrowdDevice<'_>,
+    ) -> Option<Self> {
+        let by_subgroups = device.subgroup_lanes.and_then(|lanes| {
+            SubgroupInstances::new(arguments, output, is_plain, lanes).map(Self::Subgroups)
+        });
+        let by_workgroups = WholeInstances::new(arguments, output, is_plain).map(Self::Workgroups);
+        let runs = |whole: &Self| device.maps_samples && (device.runs)(whole.kernel());
+        by_subgroups.filter(runs).or(by_workgroups.filter(runs))
+    }
+
+    fn kernel(&self) -> Kernel {
+        match self {
+            Self::Subgroups(_) => SubgroupInstances::KERNEL,
+            Self::Workgroups(whole) => whole.kernel,
+        }
+    }
 }
 
 /// The kernels that evaluate frames of a crowd.
 pub(crate) struct FrameKernels {
     output: CrowdOutput,
     /// How instances are evaluated as wholes, if they are: by one kernel for all steps.
-    pub(crate) whole: Option<WholeInstances>,
+    pub(crate) whole: Option<WholeKernel>,
     /// The kernels, in their order.
     pub(crate) kernels: Vec<Kernel>,
 }
@@ -60,8 +94,7 @@ impl FrameKernels {
         let arguments = &shape.arguments;
         // One layer of arcs.
         let is_plain = arguments.layers == 1 && shape.only_arcs;
-        let whole = WholeInstances::new(arguments, output, is_plain);
-        let whole = whole.filter(|whole| device.maps_samples && (device.binds)(whole.kernel));
+        let whole = WholeKernel::new(arguments, output, is_plain, device);
         let walks_at_once = device.maps_samples && arguments.joints <= MAX_WALKED;
         let of_step = |step| match (step, is_plain) {
             (FrameStep::Positions, _) => Kernel::CrowdTimes,
@@ -77,7 +110,7 @@ impl FrameKernels {
         Self {
             output,
             kernels: match &whole {
-                Some(whole) => vec![whole.kernel],
+                Some(whole) => vec![whole.kernel()],
                 None => FrameStep::of(output).map(of_step).collect(),
             },
             whole,
@@ -285,8 +318,17 @@ impl Frames {
         let joints = instances * arguments.joints;
         if let Some(whole) = &self.kernels.whole {
             let count = instances;
-            let (pushed, groups) = whole.dispatch(CrowdDispatch { count, ..arguments }, levels);
-            return recording.dispatch(set, &pushed, [groups, 1, 1]);
+            let arguments = CrowdDispatch { count, ..arguments };
+            return match whole {
+                WholeKernel::Subgroups(whole) => {
+                    let (pushed, groups) = whole.dispatch(&arguments);
+                    recording.dispatch(set, &pushed, [groups, 1, 1]);
+                }
+                WholeKernel::Workgroups(whole) => {
+                    let (pushed, groups) = whole.dispatch(arguments, levels);
+                    recording.dispatch(set, &pushed, [groups, 1, 1]);
+                }
+            };
         }
         let count = match kernel {
             Kernel::CrowdTimes => instances * arguments.layers * arguments.bases,
@@ -356,6 +398,9 @@ impl CrowdResources {
             | Kernel::CrowdPlainRotations
             | Kernel::CrowdLocals
             | Kernel::CrowdPlainLocals => (&[entries, channels, cells, positions], &[values]),
+            Kernel::CrowdSubgroupRotations => {
+                (&[entries, clips, bases, spans, channels, cells], &[output])
+            }
             // Over whole instances: the result is bound in both precisions.
             Kernel::CrowdWholeRotations | Kernel::CrowdPlainWholeRotations => (
                 &[entries, clips, bases, spans, channels, cells],
@@ -395,7 +440,8 @@ mod tests {
         };
         let device = CrowdDevice {
             maps_samples,
-            binds: &|_| true,
+            subgroup_lanes: None,
+            runs: &|_| true,
         };
         let kernels = FrameKernels::new(&shape, output, &device);
         let has_values = output.is_half && kernels.whole.is_none();

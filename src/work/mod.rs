@@ -3,4 +3,5 @@
 pub(crate) mod crowd;
 pub(crate) mod lists;
 pub(crate) mod recording;
+pub(crate) mod subgroup_instances;
 pub(crate) mod whole_instances;

@@ -5,7 +5,8 @@
 //!
 //! Debian 12 has no NVK. Debian 13's runs beside this system's libraries with its own loader and C library.
 
-use std::collections::BTreeMap;
+use std::cmp::Reverse;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::process::Command;
 
@@ -84,6 +85,78 @@ impl Listing {
         count(hot, |_| true).div_ceil(stores.max(1)) as u64
     }
 
+    /// The instructions of a warp on its usual way from the start to the end. `trips` says how often it goes through a
+    /// loop, from the stores of that way through it.
+    fn usual(&self, trips: &dyn Fn(usize) -> usize) -> usize {
+        let all = (0..self.blocks.len()).collect();
+        let ends = |at: usize| self.blocks[at].next.is_empty();
+        let walk = Walk {
+            listing: self,
+            trips,
+            inside: &all,
+            loops: &self.loops(),
+        };
+        walk.from(0, &ends).expect("a way to the end").instructions
+    }
+
+    /// The instructions of the usual way through the loop that stores once and lies in another one, if there is one.
+    fn storing_loop(&self) -> usize {
+        let loops = self.loops();
+        let inner = loops.iter().filter(|(start, body)| {
+            let mut others = loops.iter().filter(|(other, _)| other != start);
+            others.any(|(_, other)| body.is_subset(other))
+        });
+        let ways = inner.map(|(start, body)| self.through(*start, body, &|_| 1, &loops));
+        let storing = ways.filter(|way| way.stores == 1);
+        storing.map(|way| way.instructions).max().unwrap_or(0)
+    }
+
+    /// The usual way through a loop, once.
+    fn through(
+        &self,
+        start: usize,
+        body: &BTreeSet<usize>,
+        trips: &dyn Fn(usize) -> usize,
+        loops: &Loops,
+    ) -> Way {
+        let inner = loops.iter().filter(|(other, inner)| {
+            **other != start && inner.is_subset(body)
+        });
+        let walk = Walk {
+            listing: self,
+            trips,
+            inside: body,
+            loops: &inner.map(|(start, body)| (*start, body.clone())).collect(),
+        };
+        let ends = |at: usize| self.next(at).any(|next| next == start);
+        walk.from(start, &ends).expect("a loop goes back")
+    }
+
+    fn next(&self, at: usize) -> impl Iterator<Item = usize> {
+        let next = self.blocks[at].next.iter();
+        next.filter_map(|&id| self.blocks.iter().position(|block| block.id == id))
+    }
+
+    /// The blocks of each loop, by the one where it begins.
+    fn loops(&self) -> Loops {
+        let mut loops = Loops::new();
+        for end in 0..self.blocks.len() {
+            for start in self.next(end).filter(|start| *start <= end) {
+                let body = loops.entry(start).or_default();
+                body.insert(start);
+                let mut found = vec![end];
+                while let Some(at) = found.pop() {
+                    if body.insert(at) {
+                        found.extend((0..self.blocks.len()).filter(|&one| {
+                            self.next(one).any(|next| next == at)
+                        }));
+                    }
+                }
+            }
+        }
+        loops
+    }
+
     /// Every instruction on floats that may round otherwise than the shader says, but for so many reciprocals, and
     /// conversions of them to whole numbers, as there are divisions of whole numbers.
     fn inexact(&self, divisions: usize) -> Vec<&str> {
@@ -104,6 +177,101 @@ impl Listing {
         });
         inexact.collect()
     }
+}
+
+/// The blocks of each loop, by the first of them.
+type Loops = BTreeMap<usize, BTreeSet<usize>>;
+
+/// A way through blocks. The usual one stores most and evaluates most; of such ways it is the shortest. So runs that
+/// need care, or a store that asks for each part, are no part of it.
+#[derive(Debug, Clone, Copy, Default)]
+struct Way {
+    stores: usize,
+    /// Blocks with the products of an evaluation, or with the division of a time that goes round.
+    evaluations: usize,
+    instructions: usize,
+}
+
+impl Way {
+    fn and(self, other: Self) -> Self {
+        Self {
+            stores: self.stores + other.stores,
+            evaluations: self.evaluations + other.evaluations,
+            instructions: self.instructions + other.instructions,
+        }
+    }
+
+    fn times(self, count: usize) -> Self {
+        Self {
+            stores: self.stores * count,
+            evaluations: self.evaluations * count,
+            instructions: self.instructions * count,
+        }
+    }
+
+    fn rank(&self) -> (usize, usize, Reverse<usize>) {
+        (self.stores, self.evaluations, Reverse(self.instructions))
+    }
+}
+
+/// Looks for the usual way among some blocks.
+struct Walk<'a> {
+    listing: &'a Listing,
+    trips: &'a dyn Fn(usize) -> usize,
+    inside: &'a BTreeSet<usize>,
+    /// The loops inside, each of which is one step.
+    loops: &'a Loops,
+}
+
+impl Walk<'_> {
+    /// The usual way from a block to one that ends it.
+    fn from(&self, at: usize, ends: &dyn Fn(usize) -> bool) -> Option<Way> {
+        self.search(at, at, ends, &mut BTreeMap::new())
+    }
+
+    fn search(
+        &self,
+        start: usize,
+        at: usize,
+        ends: &dyn Fn(usize) -> bool,
+        known: &mut BTreeMap<usize, Option<Way>>,
+    ) -> Option<Way> {
+        if let Some(way) = known.get(&at) {
+            return *way;
+        }
+        known.insert(at, None);
+        let (step, next) = self.step(at);
+        let rest = next.into_iter().filter(|next| self.inside.contains(next) && *next != start);
+        let rest = rest.filter_map(|next| self.search(start, next, ends, known));
+        let rest = rest.chain(ends(at).then(Way::default));
+        let best = rest.max_by_key(Way::rank).map(|rest| step.and(rest));
+        known.insert(at, best);
+        best
+    }
+
+    /// A block or a whole loop, and the blocks that may come next.
+    fn step(&self, at: usize) -> (Way, Vec<usize>) {
+        let Some(body) = self.loops.get(&at) else {
+            let block = std::slice::from_ref(&self.listing.blocks[at]);
+            let products = count(block, |name| name.starts_with("fmul"));
+            let divisions = count(block, |name| name.starts_with("mufu.rcp"));
+            let way = Way {
+                stores: count(block, is_store),
+                evaluations: usize::from(products > 8 || divisions > 0),
+                instructions: count(block, |_| true),
+            };
+            return (way, self.listing.next(at).collect());
+        };
+        let once = self.listing.through(at, body, self.trips, self.loops);
+        let next = body.iter().flat_map(|&one| self.listing.next(one));
+        let next = next.filter(|next| !body.contains(next)).collect();
+        (once.times((self.trips)(once.stores)), next)
+    }
+}
+
+/// Whether an instruction stores into a buffer.
+fn is_store(instruction: &str) -> bool {
+    instruction.starts_with("st.global")
 }
 
 fn count(blocks: &[Block], counts: impl Fn(&str) -> bool) -> usize {
@@ -212,6 +380,117 @@ fn compiled(
     texts
         .map(|(name, text)| (name, Listing::read(&text)))
         .collect()
+}
+
+/// The head of the table of docs/gpu.md with what is predicted for cards.
+const PREDICTIONS: &str = "| kernel | of 48 | of 200 |";
+
+/// A kernel over spread runs: the parts of a value and its bytes, the most instructions that a sample of a run of 200
+/// may take, and the time of a dispatch to be reached, µs.
+struct Goal {
+    kernel: &'static str,
+    parts: usize,
+    bytes: usize,
+    most: Option<usize>,
+}
+
+const fn goal(kernel: &'static str, parts: usize, bytes: usize, most: Option<usize>) -> Goal {
+    Goal {
+        kernel,
+        parts,
+        bytes,
+        most,
+    }
+}
+
+const GOALS: [Goal; 9] = [
+    goal("arc_frames_spread_f32", 1, 16, Some(66)),
+    goal("polynomial_frames_spread_f32", 1, 16, Some(120)),
+    goal("arc_frames_spread_f16_converting", 1, 8, Some(72)),
+    goal("polynomial_frames_spread_f16_converting", 1, 8, None),
+    goal("arc_frames_spread_matrix3x4", 3, 48, Some(240)),
+    goal("polynomial_frames_spread_matrix3x4", 3, 48, None),
+    goal("arc_frames_spread_matrix3x3", 9, 36, None),
+    goal("arc_frames_spread_axis_angle", 1, 16, None),
+    goal("arc_frames_spread_euler", 3, 12, None),
+];
+
+impl Goal {
+    /// Instructions of a warp for each of its lanes' samples, in runs of so many that begin in the middle of a line. A
+    /// run has eight lanes, and is cut where 16 iterations end.
+    fn instructions(&self, listing: &Listing, samples: usize) -> usize {
+        const LANES: usize = 8;
+        const IDLE: usize = LANES / 2;
+        const CUT: usize = 32 * LANES;
+        let mut all = 0;
+        for done in (0..samples).step_by(CUT) {
+            let end = IDLE + (samples - done).min(CUT);
+            let iterations = end.div_ceil(LANES);
+            if self.parts > 1 {
+                // The first and the last iteration of a run ask for each part, by a loop that stores one.
+                let trips = |stores| if stores > 1 { iterations } else { self.parts };
+                all += listing.usual(&trips) + 2 * self.parts * listing.storing_loop();
+                continue;
+            }
+            // As `spread/alone.wgsl` divides the iterations behind the first one.
+            let pairs = (end / LANES).div_ceil(2) - 1;
+            let trips = |stores| match stores {
+                2 => pairs,
+                _ => iterations - 1 - 2 * pairs,
+            };
+            all += listing.usual(&trips);
+        }
+        (all * LANES).div_ceil(samples)
+    }
+
+    /// The predicted time of a dispatch over 4096 tracks of 1200 frames on an H200, µs: what limits it are instructions,
+    /// so many a sample, and bytes that are written.
+    fn time(&self, instructions: usize) -> f64 {
+        const SAMPLES: f64 = 4096.0 * 1200.0;
+        let issued = 0.147 * instructions as f64;
+        let written = self.bytes as f64 * SAMPLES / 4.18e6;
+        (issued.powi(3) + written.powi(3)).cbrt()
+    }
+}
+
+/// The kernels for cards take no more instructions than planned, and about as many as the table says.
+#[test]
+fn samples_take_as_many_instructions_as_planned() {
+    let Some(loader) = unpacked("nvk/loader") else {
+        return;
+    };
+    let mut kernels = Vec::from_iter(GOALS.iter().map(|goal| goal.kernel));
+    kernels.push(CROWD);
+    let listings = compiled(&loader, CHIPS[1], &kernels, false);
+    let listings = BTreeMap::from_iter(listings);
+    let (mut wrong, mut rows) = (Vec::new(), BTreeMap::new());
+    for goal in &GOALS {
+        let [short, long] = [48, 200].map(|n| goal.instructions(&listings[goal.kernel], n));
+        if goal.most.is_some_and(|most| long > most) {
+            wrong.push(format!("{}: {long} instructions, not {:?}", goal.kernel, goal.most));
+        }
+        let time = format!("{:.1}", goal.time(long));
+        rows.insert(goal.kernel, vec![short.to_string(), long.to_string(), time]);
+    }
+    let crowd = instance_of_crowd(&listings[CROWD]);
+    if crowd > MOST_OF_INSTANCE {
+        wrong.push(format!("{CROWD}: {crowd} instructions, not {MOST_OF_INSTANCE}"));
+    }
+    rows.insert(CROWD, vec!["-".to_owned(), crowd.to_string(), "-".to_owned()]);
+    wrong.extend(table::check_rows(PREDICTIONS, &rows));
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+const CROWD: &str = "crowd_subgroup_rotations";
+
+/// The most instructions of a warp for the rotations of an instance.
+const MOST_OF_INSTANCE: usize = 260;
+
+/// The instructions of a warp for an instance of 60 joints, of four, that goes round a clip of 61 keys.
+fn instance_of_crowd(listing: &Listing) -> usize {
+    // Eight lanes find one of 60 spans in two steps. Seven times all lanes have a joint, and then some.
+    let trips = |stores| if stores == 0 { 2 } else { 7 };
+    listing.usual(&trips).div_ceil(4)
 }
 
 #[test]

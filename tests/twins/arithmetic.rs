@@ -403,14 +403,17 @@ functions! { on, r:
         [(); 3].map(|()| r.rotation()), between(r)) => |((kind, is_additive), [below, layer, reference], weight)|
         entries::laid_over(on, kind, is_additive, below, layer, reference, weight),
         cpu::laid_over(kind, is_additive, below, layer, reference, weight);
-    "wide_less" of wholes(r) => |(a, b)| u32::from(entries::wide_less(on, a, b)), u32::from(a < b);
-    "wide_sum" of wholes(r) => |(a, b)| entries::wide_sum(on, a, b), words(a.wrapping_add(b));
     "wide_difference" of wholes(r) => |(a, b)| entries::wide_difference(on, a, b), words(a.wrapping_sub(b));
-    "wide_product" of (whole(r, 32) as u32, whole(r, 32) as u32) => |(a, b)|
-        entries::wide_product(on, a, b), words(u64::from(a) * u64::from(b));
-    "wide_remainder" of (whole(r, 63), 1 + whole(r, 62)) => |(x, q)|
-        entries::wide_remainder(on, x, q), words(crowd_times::wide_remainder(x, q));
-    "in_parts" of r.word() => |x| entries::in_parts(on, x), words(crowd_times::in_parts(x));
+    "move_of" of (whole(r, 23) as u32, whole(r, 40)) => |(speed, time)|
+        { let moved = entries::move_of(on, speed, time); [moved.ticks[0], moved.ticks[1], moved.part] },
+        {
+            let moved = u64::from(speed) * time;
+            let [low, high] = words(moved >> 16);
+            [low, high, u32::from(moved & 0xffff != 0)]
+        };
+    "remainder" of (whole(r, 32) as u32, 1 + whole(r, 31) as u32) => |(x, q)| entries::remainder(on, x, q), x % q;
+    "tick_remainder" of (whole(r, 48), 1 + whole(r, 31) as u32) => |(x, q)|
+        entries::tick_remainder(on, x, q), (x % u64::from(q)) as u32;
     "tick_of" of entry(r) => |(entry, period)|
         entries::tick_of(on, entry, period), crowd_times::tick_of(&entry, period, CLOCK);
 }

@@ -15,6 +15,7 @@ use crate::pose::skeleton::Skeleton;
 use crate::shader::{CrowdDispatch, Kernel};
 use crate::tracks::set::TrackSet;
 use crate::twin::machine::Memory;
+use crate::work::subgroup_instances::SubgroupInstances;
 use crate::work::whole_instances::WholeInstances;
 use crate::{Device, Engine};
 
@@ -43,8 +44,14 @@ fn library(joints: usize, method: Method) -> CrowdLibrary {
     library
 }
 
-/// Runs all workgroups, counts, and compares the result with the CPU's.
-fn assert_stores_whole_lines(library: &CrowdLibrary, layers: usize, output: CrowdOutput) {
+/// Runs all workgroups of the kernel over whole instances, counts, and compares the result with the CPU's; the same
+/// for the kernel whose subgroups take them, if there are lanes. Returns the kernel.
+fn assert_stores_whole_lines(
+    library: &CrowdLibrary,
+    layers: usize,
+    output: CrowdOutput,
+    subgroup_lanes: Option<u32>,
+) -> Kernel {
     const CLOCK: u64 = 1 << 20;
     let mut random = Rng::with_seed(6);
     let joints = library.joint_count() as u32;
@@ -54,8 +61,19 @@ fn assert_stores_whole_lines(library: &CrowdLibrary, layers: usize, output: Crow
         ..library.arguments(layers)
     };
     let is_plain = layers == 1 && library.tables.has_only_arcs();
-    let whole = WholeInstances::new(&arguments, output, is_plain).expect("it is small");
-    let (pushed, groups) = whole.dispatch(arguments, &library.levels);
+    let (kernel, pushed, groups) = match subgroup_lanes {
+        None => {
+            let whole = WholeInstances::new(&arguments, output, is_plain).expect("it is small");
+            let (pushed, groups) = whole.dispatch(arguments, &library.levels);
+            (whole.kernel, bytemuck::bytes_of(&pushed).to_vec(), groups)
+        }
+        Some(lanes) => {
+            let whole = SubgroupInstances::new(&arguments, output, is_plain, lanes).unwrap();
+            let (pushed, groups) = whole.dispatch(&arguments);
+            let pushed = bytemuck::bytes_of(&pushed).to_vec();
+            (SubgroupInstances::KERNEL, pushed, groups)
+        }
+    };
     let engine = Engine::new(Device::Cpu).unwrap();
     let mut crowd = engine.crowd(library, INSTANCES as usize, layers).unwrap();
     crowd.set_clock(CLOCK).unwrap();
@@ -90,15 +108,15 @@ fn assert_stores_whole_lines(library: &CrowdLibrary, layers: usize, output: Crow
             bytemuck::cast_slice(&library.bind),
         ]);
     }
-    let arguments = bytemuck::bytes_of(&pushed);
-    let memory = Memory::new(whole.kernel, inputs.into_iter(), arguments, Vec::new());
+    let memory = Memory::new(kernel, inputs.into_iter(), &pushed, Vec::new());
+    let memory = memory.with_subgroups_of(subgroup_lanes.unwrap_or(32));
     let mut count = Count::default();
     for group in 0..groups {
         count.add(&memory, [group, 0, 0], [groups, 1, 1]);
     }
     let found = memory.into_output();
     // Nothing is stored but the result, once.
-    assert_eq!(count.words as usize, found.len(), "{:?}", whole.kernel);
+    assert_eq!(count.words as usize, found.len(), "{kernel:?}");
     let expected: Vec<u32> = match output.is_half {
         true => {
             let mut values = vec![[0u16; 4]; crowd.output_len(output)];
@@ -113,7 +131,7 @@ fn assert_stores_whole_lines(library: &CrowdLibrary, layers: usize, output: Crow
             bytemuck::pod_collect_to_vec(&values)
         }
     };
-    let label = format!("{:?}, {joints} joints, {output:?}", whole.kernel);
+    let label = format!("{kernel:?}, {joints} joints, {output:?}, {subgroup_lanes:?}");
     assert!(found == expected, "{label}: not the CPU's values");
     for ((wave, line), [stores, loads]) in CARDS.into_iter().zip(count.of_cards) {
         let (stored, loaded) = (stores.ratio(), loads.ratio());
@@ -122,6 +140,7 @@ fn assert_stores_whole_lines(library: &CrowdLibrary, layers: usize, output: Crow
         assert!(stored <= 1.1, "{label}: {stored}");
         assert!(loaded <= 1.3, "{label}: {loaded}");
     }
+    kernel
 }
 
 /// Waves store whole lines, from any instance on, and all that is stored is the result.
@@ -137,10 +156,8 @@ fn whole_instances_store_whole_lines() {
         let library = library(joints, method);
         for values in CrowdValues::ALL {
             for output in [CrowdOutput::from(values), CrowdOutput::half(values)] {
-                assert_stores_whole_lines(&library, layers, output);
-                let arguments = library.arguments(layers);
-                let whole = WholeInstances::new(&arguments, output, layers == 1);
-                kernels.extend(whole.map(|whole| whole.kernel as usize));
+                let kernel = assert_stores_whole_lines(&library, layers, output, None);
+                kernels.push(kernel as usize);
             }
         }
     }
@@ -154,4 +171,13 @@ fn whole_instances_store_whole_lines() {
         all.iter()
             .all(|kernel| kernels.contains(&(*kernel as usize)))
     );
+}
+
+/// Whatever the number of lanes is.
+#[test]
+fn subgroups_store_whole_lines() {
+    for (joints, lanes) in [(60, 8), (60, 16), (60, 32), (60, 64), (8, 32), (2, 64)] {
+        let rotations = CrowdValues::Rotations.into();
+        assert_stores_whole_lines(&library(joints, SLERP), 1, rotations, Some(lanes));
+    }
 }

@@ -1,6 +1,6 @@
 //! Whole kernels on the inputs of their check, beside the CPU's way to the same results.
 
-use bytemuck::{AnyBitPattern, NoUninit};
+use bytemuck::{AnyBitPattern, NoUninit, Zeroable as _};
 
 use crate::cpu::evaluate::one;
 use crate::gpu::kernel_check::random::Random;
@@ -8,7 +8,7 @@ use crate::gpu::kernel_check::{Trial, trials};
 use crate::output::encoding::Encoding;
 use crate::shader::{
     ArcSegment, ArcsDispatch, CrowdBase, CrowdChange, CrowdChannel, CrowdClip, CrowdDispatch,
-    CrowdEntry, CrowdLink, CrowdPosition, CrowdSpan, END_NEGATED, Form, IS_CONSTANT, KERNELS,
+    CrowdEntry, CrowdLink, CrowdPosition, CrowdSpan, CrowdSubgroupDispatch, END_NEGATED, Form, IS_CONSTANT, KERNELS,
     Kernel, Link, List, ListedSample, PoseDispatch, ROTATION, SCALE, START_NEGATED, Store,
     TRANSLATION, WORKGROUP,
 };
@@ -309,6 +309,47 @@ fn positions_of_crowds() {
         all.truncate(all.iter().rposition(is_there).map_or(0, |last| last + 1));
         all
     });
+}
+
+/// With any number of lanes.
+#[test]
+fn rotations_of_crowds_by_subgroups() {
+    let kernel = Kernel::CrowdSubgroupRotations;
+    assert_is(kernel, |trial| {
+        let pushed = trial.pushed::<CrowdSubgroupDispatch>();
+        let clock = u64::from(pushed.clock_low) | u64::from(pushed.clock_high) << 32;
+        let (entries, clips) = (trial.input::<CrowdEntry>(0), trial.input::<CrowdClip>(1));
+        let (bases, spans) = (trial.input::<CrowdBase>(2), trial.input::<CrowdSpan>(3));
+        let entries = &entries[pushed.first_instance as usize..][..pushed.count as usize];
+        let most = clips.iter().map(|clip| clip.bases).max().unwrap();
+        let mut positions = vec![CrowdPosition::zeroed(); entries.len() * most as usize];
+        let of_instances = positions.chunks_mut(most as usize);
+        for (entry, found) in entries.iter().zip(of_instances) {
+            crowd_times::base_positions(entry, clock, &clips, &bases, &spans, found);
+        }
+        let layers = Layers {
+            entries,
+            channels: &trial.input::<CrowdChannel>(4),
+            cells: &trial.input(5),
+            positions: &positions,
+            joints: pushed.joints,
+            layers: 1,
+            bases: most,
+            masks: 0,
+            references: 0,
+        };
+        let joints = 0..pushed.count * pushed.joints;
+        let rotation = |i| layers.layered(i / pushed.joints, i % pushed.joints, ROTATION);
+        joints.map(rotation).collect()
+    });
+    for trial in trials(kernel, &mut Random::canonical()) {
+        let expected = trial.expected(kernel);
+        for lanes in [8, 16, 64] {
+            let memory = trial.memory(kernel).with_subgroups_of(lanes);
+            memory.run::<f32, ()>(trial.groups, |_| ());
+            assert_eq!(memory.into_output(), expected, "{lanes} lanes");
+        }
+    }
 }
 
 #[test]

@@ -50,7 +50,7 @@ impl VulkanEngine {
         &self,
         each: &mut dyn FnMut(&'static str, Duration) -> bool,
     ) -> Result<(), VulkanError> {
-        for code in self.bindable() {
+        for code in self.runnable() {
             let started = Instant::now();
             let pipeline = Pipeline::new(&self.device, code.kernel, Exactness::Demanded)?;
             if !each(pipeline.name, started.elapsed()) {

@@ -261,7 +261,7 @@ impl VulkanEngine {
             Ok(check)
         };
         let mut outcome = Ok(());
-        for code in self.bindable() {
+        for code in self.runnable() {
             let goes_on = match check(code) {
                 Ok(check) => each(check),
                 Err(error) => {
@@ -279,16 +279,15 @@ impl VulkanEngine {
 
     /// The known results of the kernels' checks.
     pub(crate) fn known_kernels(&self) -> Vec<KernelCheck> {
-        self.bindable()
+        self.runnable()
             .map(|code| self.known_kernel(code))
             .collect()
     }
 
-    /// The kernels that this device can run: those that bind no more storage buffers than it allows.
-    pub(crate) fn bindable(&self) -> impl Iterator<Item = &'static KernelCode> {
-        let limit = self.device.physical.storage_buffers;
-        let needed = |code: &KernelCode| Pipeline::storage_buffers(&self.device, code.kernel);
-        KERNELS.iter().filter(move |code| needed(code) <= limit)
+    /// The kernels that this device can run.
+    pub(crate) fn runnable(&self) -> impl Iterator<Item = &'static KernelCode> {
+        let kernels = KERNELS.iter();
+        kernels.filter(|code| Pipeline::can_run(&self.device, code.kernel))
     }
 
     fn known_kernel(&self, code: &KernelCode) -> KernelCheck {

@@ -132,7 +132,8 @@ pub(crate) fn trials(kernel: Kernel, random: &mut Random) -> Vec<Trial> {
         Kernel::CrowdWholeRotations
         | Kernel::CrowdPlainWholeRotations
         | Kernel::CrowdWholeMatrices
-        | Kernel::CrowdPlainWholeMatrices => whole_instances::trials(kernel, random),
+        | Kernel::CrowdPlainWholeMatrices
+        | Kernel::CrowdSubgroupRotations => whole_instances::trials(kernel, random),
         _ => segments::trials(kernel, random),
     }
 }

@@ -3,10 +3,13 @@
 use crate::math::canonical::canonical;
 use crate::output::crowd::{CrowdOutput, CrowdValues};
 use crate::shader::{
-    CHANNELS, CrowdBase, CrowdChannel, CrowdClip, CrowdEntry, CrowdSpan, CrowdWholeDispatch,
-    FORM_ARC, FORM_CUBIC, Kernel, ON_KEY, ROTATION, SPEED_MAGNITUDE, START_BIAS,
+    CHANNELS, CrowdBase, CrowdChannel, CrowdClip, CrowdDispatch, CrowdEntry, CrowdSpan,
+    CrowdWholeDispatch, FORM_ARC, FORM_CUBIC, Kernel, ON_KEY, ROTATION, SPEED_MAGNITUDE, START_BIAS,
 };
 use crate::twin::crowd_matrices::Rows;
+use crate::work::subgroup_instances::SubgroupInstances;
+
+use bytemuck::Zeroable as _;
 
 use super::crowd::{
     BASES, BEFORE, CELLS, CLIPS, JOINTS, LEVELS, MASKS, channel, entry, links_of_levels, plain,
@@ -23,6 +26,10 @@ const CLOCK: u64 = 0x00ab_cdef_0123_4567;
 
 pub(super) fn trials(kernel: Kernel, random: &mut Random) -> Vec<Trial> {
     use CrowdValues::{Local, Model, Rotations, Skinning};
+    if kernel == Kernel::CrowdSubgroupRotations {
+        // Two instances of two time bases, and one of them, with the fewest lanes.
+        return [2, 1].map(|instances| of_subgroups(random, instances)).into();
+    }
     let is_plain = matches!(
         kernel,
         Kernel::CrowdPlainWholeRotations | Kernel::CrowdPlainWholeMatrices
@@ -38,9 +45,49 @@ pub(super) fn trials(kernel: Kernel, random: &mut Random) -> Vec<Trial> {
             CrowdOutput::half(Skinning),
         ],
     };
-    let trial = |output| WholeScene::new(random, is_plain).trial(output);
+    let trial = |output| WholeScene::new(random, is_plain, &SMALL).trial(output);
     outputs.into_iter().map(trial).collect()
 }
+
+/// A trial of the kernel whose subgroups take whole instances, for subgroups of any number of lanes.
+fn of_subgroups(random: &mut Random, instances: u32) -> Trial {
+    let scene = WholeScene::new(random, true, &LARGE);
+    let arguments = CrowdDispatch {
+        count: INSTANCES - 1,
+        first_instance: BEFORE,
+        joints: LARGE.joints,
+        bases: BASES,
+        clock_low: CLOCK as u32,
+        clock_high: (CLOCK >> 32) as u32,
+        ..CrowdDispatch::zeroed()
+    };
+    let pushed = SubgroupInstances::pushed(instances.ilog2(), &arguments);
+    // As many workgroups as it takes where each has one subgroup; others find nothing to do.
+    let groups = [2, INSTANCES.div_ceil(instances).div_ceil(2), 1];
+    Trial::new(scene.inputs(), &pushed, groups)
+}
+
+/// How large a scene is.
+struct Size {
+    joints: u32,
+    /// The most spans of a time base.
+    spans: u32,
+    /// Cells of segments and keys, before the masks.
+    cells: u32,
+}
+
+const SMALL: Size = Size {
+    joints: JOINTS,
+    spans: 2,
+    cells: CELLS,
+};
+
+/// So many joints that a lane has several, and so many spans that some are looked for in several steps.
+const LARGE: Size = Size {
+    joints: 44,
+    spans: 40,
+    cells: 256,
+};
 
 /// Everything that the kernels read.
 struct WholeScene {
@@ -58,7 +105,8 @@ struct WholeScene {
 const CELL_TABLES: [u32; 2] = [CELLS, CELLS + MASKS * JOINTS];
 
 impl WholeScene {
-    fn new(random: &mut Random, is_plain: bool) -> Self {
+    fn new(random: &mut Random, is_plain: bool, size: &Size) -> Self {
+        let &Size { joints, spans: most_spans, cells } = size;
         let layers = if is_plain { 1 } else { 4 };
         let (mut clips, mut bases, mut spans) = (Vec::new(), Vec::new(), Vec::new());
         for clip in 0..CLIPS {
@@ -70,32 +118,33 @@ impl WholeScene {
                 bases: base_count,
             });
             for _ in 0..base_count {
-                let count = 1 + random.below(2);
+                let count = 1 + random.below(most_spans);
                 bases.push(CrowdBase {
                     first: spans.len() as u32,
                     count,
-                    step: count - 1,
+                    step: if count < 2 { 0 } else { 1 << (count - 1).ilog2() },
                 });
+                let starts = (1..most_spans).map(|_| random.below(period));
+                let mut starts = Vec::from_iter(starts);
+                starts.truncate(count as usize - 1);
+                starts.push(0);
+                starts.sort_unstable();
                 // Parameters are about -1 to 1.
-                spans.extend(
-                    [0, random.below(period)][..count as usize]
-                        .iter()
-                        .map(|&start| CrowdSpan {
-                            start: start | if random.once_in(2) { ON_KEY } else { 0 },
-                            whole: start as i32,
-                            scale: canonical(random.parameter() / period as f32),
-                            offset: random.parameter(),
-                        }),
-                );
+                spans.extend(starts.into_iter().map(|start| CrowdSpan {
+                    start: start | if random.once_in(2) { ON_KEY } else { 0 },
+                    whole: start as i32,
+                    scale: canonical(random.parameter() / period as f32),
+                    offset: random.parameter(),
+                }));
             }
         }
-        let channels = (0..CLIPS * JOINTS * CHANNELS).map(|index| {
+        let channels = (0..CLIPS * joints * CHANNELS).map(|index| {
             let any = match (is_plain, index % CHANNELS == ROTATION) {
                 (true, true) => plain(random, FORM_ARC),
                 (true, false) => plain(random, FORM_CUBIC),
                 (false, _) => channel(random),
             };
-            let base = random.below(clips[(index / (JOINTS * CHANNELS)) as usize].bases);
+            let base = random.below(clips[(index / (joints * CHANNELS)) as usize].bases);
             CrowdChannel {
                 form_and_base: any.form_and_base & 0xff00_0000 | base,
                 ..any
@@ -116,8 +165,7 @@ impl WholeScene {
             entry
         });
         let entries = entries.collect();
-        let [_, references] = CELL_TABLES;
-        let cells = references + CLIPS * JOINTS * CHANNELS;
+        let cells = cells + MASKS * joints + CLIPS * joints * CHANNELS;
         let mut cells: Vec<[f32; 4]> = (0..cells).map(|_| random.rotation()).collect();
         if is_plain {
             cells[0] = [0.0; 4];
@@ -157,17 +205,22 @@ impl WholeScene {
         };
         // One of the workgroups has no instance.
         let groups = [2, INSTANCES.div_ceil(OF_WORKGROUP).div_ceil(2), 1];
-        let mut inputs = vec![
+        let mut inputs = self.inputs();
+        if !is_rotations {
+            inputs.extend([bytes(&links), bytes(&self.bind)]);
+        }
+        Trial::new(inputs, &pushed, groups)
+    }
+
+    /// The buffers that all kernels read.
+    fn inputs(&self) -> Vec<Vec<u8>> {
+        vec![
             bytes(&self.entries),
             bytes(&self.clips),
             bytes(&self.bases),
             bytes(&self.spans),
             bytes(&self.channels),
             bytes(&self.cells),
-        ];
-        if !is_rotations {
-            inputs.extend([bytes(&links), bytes(&self.bind)]);
-        }
-        Trial::new(inputs, &pushed, groups)
+        ]
     }
 }

@@ -22,6 +22,7 @@ use crate::machine::error::VulkanError;
 use crate::machine::error::calls::Named;
 use crate::machine::options::{EngineOptions, Mapping, Reads, Transfer};
 pub(crate) use crate::machine::reports::{DeviceInfo, DeviceKind};
+use crate::shader::MAX_SUBGROUP_POSITIONS;
 use crate::shader::spirv::FloatControls;
 
 /// Bytes of one texel of the texel buffers that kernels read.
@@ -64,6 +65,8 @@ pub(crate) struct PhysicalDevice {
     /// Whether kernels convert to half precision: conversions round to nearest, ties to even, and keep subnormal
     /// numbers, whatever numbers of 32 bits do, and buffers may have halves.
     pub(crate) converts_halves: bool,
+    /// The lanes of a subgroup, if they are as many as kernels need and can vote and shuffle in them.
+    pub(crate) subgroup_lanes: Option<u32>,
     /// Whether memory and semaphores can be exported as file descriptors (`VK_KHR_external_memory_fd`,
     /// `VK_KHR_external_semaphore_fd`).
     pub(crate) memory_files: bool,
@@ -137,9 +140,11 @@ impl PhysicalDevice {
         let mut maintenance = vk::PhysicalDeviceMaintenance3Properties::default();
         let mut imported = vk::PhysicalDeviceExternalMemoryHostPropertiesEXT::default();
         let mut id = vk::PhysicalDeviceIDProperties::default();
+        let mut subgroups = vk::PhysicalDeviceSubgroupProperties::default();
         let mut all = vk::PhysicalDeviceProperties2::default()
             .push_next(&mut maintenance)
-            .push_next(&mut id);
+            .push_next(&mut id)
+            .push_next(&mut subgroups);
         let borrows = has(ext::external_memory_host::NAME);
         if borrows {
             all = all.push_next(&mut imported);
@@ -230,6 +235,7 @@ impl PhysicalDevice {
             timelines_extension: reports_timelines && !core_1_2,
             has_int64,
             converts_halves,
+            subgroup_lanes: subgroup_lanes(&subgroups),
             max_texel_buffer_elements: limits.max_texel_buffer_elements,
             non_coherent_atom: limits.non_coherent_atom_size.max(1),
             storage_buffers: limits.max_per_stage_descriptor_storage_buffers,
@@ -362,6 +368,19 @@ impl PhysicalDevice {
         let found = preferred.find_map(|&flags| find(required | flags));
         found.or_else(|| find(required))
     }
+}
+
+/// The lanes of a subgroup of a compute kernel, if there are as many as kernels divide among positions, and not more
+/// than two words of a ballot have, and they vote and shuffle.
+fn subgroup_lanes(properties: &vk::PhysicalDeviceSubgroupProperties<'_>) -> Option<u32> {
+    const LANES: std::ops::RangeInclusive<u32> = 2 * MAX_SUBGROUP_POSITIONS..=64;
+    let needed = vk::SubgroupFeatureFlags::BASIC
+        | vk::SubgroupFeatureFlags::BALLOT
+        | vk::SubgroupFeatureFlags::SHUFFLE;
+    let can = (properties.supported_stages).contains(vk::ShaderStageFlags::COMPUTE)
+        && properties.supported_operations.contains(needed);
+    let lanes = properties.subgroup_size;
+    (can && LANES.contains(&lanes) && lanes.is_power_of_two()).then_some(lanes)
 }
 
 fn kind(device_type: vk::PhysicalDeviceType) -> DeviceKind {

@@ -1,0 +1,132 @@
+//! Instances that a card's subgroups evaluate as wholes: as [`WholeInstances`](super::whole_instances::WholeInstances),
+//! with neither memory of a workgroup nor barriers (`shaders/crowd/subgroup_rotations.wgsl`).
+
+use crate::output::crowd::{CrowdOutput, CrowdValues};
+use crate::shader::{
+    CROWD_WORKGROUP, CrowdDispatch, CrowdSubgroupDispatch, Kernel, LINE_VECTORS,
+    MAX_SUBGROUP_JOINTS, MAX_SUBGROUP_POSITIONS,
+};
+
+/// How the instances of a crowd are evaluated by subgroups, for one output.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct SubgroupInstances {
+    /// Instances of a subgroup, as a power of two.
+    instances_log2: u32,
+    /// Lanes of a subgroup.
+    lanes: u32,
+}
+
+impl SubgroupInstances {
+    pub(crate) const KERNEL: Kernel = Kernel::CrowdSubgroupRotations;
+
+    /// For rotations in 32 bits, of one layer of arcs each, of which some instances fill whole lines of memory. Their
+    /// times take about as long as the joints of one instance, so a subgroup has as many instances as it has room for.
+    pub(crate) fn new(
+        arguments: &CrowdDispatch,
+        output: CrowdOutput,
+        is_plain: bool,
+        lanes: u32,
+    ) -> Option<Self> {
+        let CrowdDispatch { joints, bases, .. } = *arguments;
+        let fits = |instances_log2: &u32| {
+            let all = joints << instances_log2;
+            bases << instances_log2 <= MAX_SUBGROUP_POSITIONS
+                && all <= MAX_SUBGROUP_JOINTS
+                && all.is_multiple_of(LINE_VECTORS)
+        };
+        let is_stored_alike = output == CrowdOutput::from(CrowdValues::Rotations);
+        let most = MAX_SUBGROUP_POSITIONS.ilog2();
+        let instances_log2 = (0..=most).rev().find(fits)?;
+        (is_plain && is_stored_alike).then_some(Self {
+            instances_log2,
+            lanes,
+        })
+    }
+
+    /// The arguments of a dispatch over as many instances as `arguments` counts, and how many workgroups it has.
+    pub(crate) fn dispatch(self, arguments: &CrowdDispatch) -> (CrowdSubgroupDispatch, u32) {
+        let subgroups = arguments.count.div_ceil(1 << self.instances_log2);
+        let of_workgroup = (CROWD_WORKGROUP / self.lanes).max(1);
+        let pushed = Self::pushed(self.instances_log2, arguments);
+        (pushed, subgroups.div_ceil(of_workgroup))
+    }
+
+    /// The arguments of a dispatch whose subgroups take so many instances, as a power of two.
+    pub(crate) fn pushed(instances_log2: u32, arguments: &CrowdDispatch) -> CrowdSubgroupDispatch {
+        const SHARE_BITS: u32 = 20;
+        let positions = (arguments.bases << instances_log2).next_power_of_two();
+        CrowdSubgroupDispatch {
+            count: arguments.count,
+            first_instance: arguments.first_instance,
+            joints: arguments.joints,
+            clock_low: arguments.clock_low,
+            clock_high: arguments.clock_high,
+            instances_log2,
+            positions_log2: positions.ilog2(),
+            // Every `positions`th bit.
+            position_lanes: u32::MAX / ((1 << positions) - 1),
+            joint_share: (1u32 << SHARE_BITS).div_ceil(arguments.joints),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use bytemuck::Zeroable as _;
+
+    use super::*;
+
+    fn arguments(joints: u32, bases: u32) -> CrowdDispatch {
+        CrowdDispatch {
+            count: 10_000,
+            joints,
+            bases,
+            ..CrowdDispatch::zeroed()
+        }
+    }
+
+    #[test]
+    fn subgroups_take_as_many_instances_as_there_is_room_for() {
+        let rotations = CrowdOutput::from(CrowdValues::Rotations);
+        let instances = |joints, bases| {
+            let found = SubgroupInstances::new(&arguments(joints, bases), rotations, true, 32);
+            found.map(|found| 1 << found.instances_log2)
+        };
+        assert_eq!(instances(60, 1), Some(4));
+        assert_eq!(instances(60, 2), Some(2));
+        assert_eq!(instances(64, 4), Some(1));
+        assert_eq!(instances(256, 1), Some(4));
+        assert_eq!(instances(512, 1), Some(2));
+        // They end within a line, there are too many positions or too many joints.
+        assert_eq!(instances(21, 1), None);
+        assert_eq!(instances(60, 3), None);
+        assert_eq!(instances(64, 5), None);
+        assert_eq!(instances(1032, 1), None);
+    }
+
+    #[test]
+    fn other_outputs_have_other_kernels() {
+        let of = |output, is_plain| SubgroupInstances::new(&arguments(60, 1), output, is_plain, 32);
+        let rotations = CrowdOutput::from(CrowdValues::Rotations);
+        assert!(of(rotations, true).is_some() && of(rotations, false).is_none());
+        assert_eq!(of(CrowdOutput::half(CrowdValues::Rotations), true), None);
+        assert_eq!(of(CrowdValues::Local.into(), true), None);
+    }
+
+    /// Every joint of a subgroup finds its instance by a product.
+    #[test]
+    fn joints_are_divided_among_instances() {
+        let rotations = CrowdOutput::from(CrowdValues::Rotations);
+        for joints in 1..=MAX_SUBGROUP_JOINTS {
+            let arguments = arguments(joints, 1);
+            let Some(found) = SubgroupInstances::new(&arguments, rotations, true, 32) else {
+                continue;
+            };
+            let (pushed, groups) = found.dispatch(&arguments);
+            assert_eq!(groups, (10_000u32 >> found.instances_log2).div_ceil(2));
+            for index in 0..joints << found.instances_log2 {
+                assert_eq!((index * pushed.joint_share) >> 20, index / joints);
+            }
+        }
+    }
+}
