@@ -14,9 +14,9 @@ use std::fmt::Write as _;
 
 use naga::valid::{FunctionInfo, ModuleInfo};
 use naga::{
-    AddressSpace, ArraySize, BinaryOperator, Binding, Block, BuiltIn, Expression, Function, GatherMode, Handle,
-    Literal, LocalVariable, MathFunction, Module, ScalarKind, Span, Statement, Type, TypeInner,
-    UnaryOperator,
+    AddressSpace, ArraySize, BinaryOperator, Binding, Block, BuiltIn, Expression, Function,
+    GatherMode, Handle, Literal, LocalVariable, MathFunction, Module, ScalarKind, Span, Statement,
+    Type, TypeInner, UnaryOperator,
 };
 
 use crate::functions::{ATOM, LOOSE, Result, Text, UNARY, atom, binary, docs, field, formatted};

@@ -26,8 +26,8 @@ use std::path::Path;
 
 use naga::back::spv;
 use naga::front::wgsl::{Frontend, Options};
-use naga::{Binding, BuiltIn};
 use naga::valid::{Capabilities, GlobalUse, ModuleInfo, ValidationFlags, Validator};
+use naga::{Binding, BuiltIn};
 
 use entries::Source;
 use functions::Functions;

@@ -2098,14 +2098,14 @@ pub(crate) fn held_tick<M: Machine>(
     let end = period.wrapping_add(START_BIAS);
     let later = start.wrapping_add(ticks[0]);
     let earlier = start.wrapping_sub(ticks[0]).wrapping_sub(part);
-    let is_beyond = (ticks[1] != 0u32)
+    let is_outside = (ticks[1] != 0u32)
         | (if backwards {
             start <= ticks[0]
         } else {
             later < start
         });
     let moved = if backwards { earlier } else { later };
-    let tick = if is_beyond {
+    let tick = if is_outside {
         if backwards { 0u32 } else { end }
     } else {
         moved
@@ -4967,15 +4967,15 @@ pub(crate) fn move_of<M: Machine>(machine: &M, speed: u32, time: [u32; 2]) -> Cr
     let parts = speed_low.wrapping_mul(time_low);
     let first = (parts >> 16u32).wrapping_add(speed_high.wrapping_mul(time_low));
     let second = speed_low.wrapping_mul(time_high);
-    let far = speed_high
+    let high = speed_high
         .wrapping_mul(time_high)
         .wrapping_add(speed.wrapping_mul(time[1]));
     let near = first.wrapping_add(second);
-    let low = near.wrapping_add(far << 16u32);
+    let low = near.wrapping_add(high << 16u32);
     let carried =
         (if near < first { 1u32 } else { 0u32 }).wrapping_add(if low < near { 1u32 } else { 0u32 });
     CrowdMove {
-        ticks: [low, (far >> 16u32).wrapping_add(carried)],
+        ticks: [low, (high >> 16u32).wrapping_add(carried)],
         part: if parts & 0xffffu32 != 0u32 {
             1u32
         } else {

@@ -14,7 +14,7 @@ fn wide_difference(a: vec2u, b: vec2u) -> vec2u {
     return vec2u(a.x - b.x, a.y - b.y - select(0u, 1u, a.x < b.x));
 }
 
-// How far a layer has moved: whole ticks, below 2^48, and 1 if it is a part of a tick more.
+// How high a layer has moved: whole ticks, below 2^48, and 1 if it is a part of a tick more.
 struct CrowdMove {
     ticks: vec2u,
     part: u32,
@@ -30,11 +30,11 @@ fn move_of(speed: u32, time: vec2u) -> CrowdMove {
     let first = (parts >> 16u) + speed_high * time_low;
     let second = speed_low * time_high;
     // In units of 2^16 ticks.
-    let far = speed_high * time_high + speed * time.y;
+    let high = speed_high * time_high + speed * time.y;
     let near = first + second;
-    let low = near + (far << 16u);
+    let low = near + (high << 16u);
     let carried = select(0u, 1u, near < first) + select(0u, 1u, low < near);
-    return CrowdMove(vec2u(low, (far >> 16u) + carried), select(0u, 1u, (parts & 0xffffu) != 0u));
+    return CrowdMove(vec2u(low, (high >> 16u) + carried), select(0u, 1u, (parts & 0xffffu) != 0u));
 }
 
 // x modulo q, for q from 1 on.
@@ -69,9 +69,9 @@ fn held_tick(start: u32, ticks: vec2u, part: u32, backwards: bool, period: u32) 
     let later = start + ticks.x;
     let earlier = start - ticks.x - part;
     // Where it is beyond what 32 bits can say.
-    let is_beyond = (ticks.y != 0u) | select(later < start, start <= ticks.x, backwards);
+    let is_outside = (ticks.y != 0u) | select(later < start, start <= ticks.x, backwards);
     let moved = select(later, earlier, backwards);
-    let tick = select(moved, select(end, 0u, backwards), is_beyond);
+    let tick = select(moved, select(end, 0u, backwards), is_outside);
     return select(select(tick, end, tick > end), START_BIAS, tick < START_BIAS) - START_BIAS;
 }
 

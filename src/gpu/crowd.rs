@@ -426,7 +426,11 @@ mod tests {
             let lanes = on_device.device.engine.device.physical.subgroup_lanes;
             let by_subgroups = ["crowd_subgroup_rotations"];
             let by_workgroups = ["crowd_plain_whole_rotations"];
-            let expected = if lanes.is_some() { by_subgroups } else { by_workgroups };
+            let expected = if lanes.is_some() {
+                by_subgroups
+            } else {
+                by_workgroups
+            };
             assert_eq!(kernels(&crowd, Rotations.into()), expected);
             assert_eq!(kernels(&crowd, CrowdOutput::half(Rotations)), by_workgroups);
             for output in [CrowdOutput::from, CrowdOutput::half] {

@@ -35,8 +35,8 @@ impl SubgroupInstances {
                 && all.is_multiple_of(LINE_VECTORS)
         };
         let is_stored_alike = output == CrowdOutput::from(CrowdValues::Rotations);
-        let most = MAX_SUBGROUP_POSITIONS.ilog2();
-        let instances_log2 = (0..=most).rev().find(fits)?;
+        let largest = MAX_SUBGROUP_POSITIONS.ilog2();
+        let instances_log2 = (0..=largest).rev().find(fits)?;
         (is_plain && is_stored_alike).then_some(Self {
             instances_log2,
             lanes,

@@ -87,7 +87,7 @@ impl Listing {
 
     /// The instructions of a warp on its usual way from the start to the end. `trips` says how often it goes through a
     /// loop, from the stores of that way through it.
-    fn usual(&self, trips: &dyn Fn(usize) -> usize) -> usize {
+    fn typical(&self, trips: &dyn Fn(usize) -> usize) -> usize {
         let all = (0..self.blocks.len()).collect();
         let ends = |at: usize| self.blocks[at].next.is_empty();
         let walk = Walk {
@@ -106,9 +106,9 @@ impl Listing {
             let mut others = loops.iter().filter(|(other, _)| other != start);
             others.any(|(_, other)| body.is_subset(other))
         });
-        let ways = inner.map(|(start, body)| self.through(*start, body, &|_| 1, &loops));
-        let storing = ways.filter(|way| way.stores == 1);
-        storing.map(|way| way.instructions).max().unwrap_or(0)
+        let traces = inner.map(|(start, body)| self.through(*start, body, &|_| 1, &loops));
+        let storing = traces.filter(|trace| trace.stores == 1);
+        storing.map(|trace| trace.instructions).max().unwrap_or(0)
     }
 
     /// The usual way through a loop, once.
@@ -118,10 +118,10 @@ impl Listing {
         body: &BTreeSet<usize>,
         trips: &dyn Fn(usize) -> usize,
         loops: &Loops,
-    ) -> Way {
-        let inner = loops.iter().filter(|(other, inner)| {
-            **other != start && inner.is_subset(body)
-        });
+    ) -> Trace {
+        let inner = loops
+            .iter()
+            .filter(|(other, inner)| **other != start && inner.is_subset(body));
         let walk = Walk {
             listing: self,
             trips,
@@ -147,9 +147,10 @@ impl Listing {
                 let mut found = vec![end];
                 while let Some(at) = found.pop() {
                     if body.insert(at) {
-                        found.extend((0..self.blocks.len()).filter(|&one| {
-                            self.next(one).any(|next| next == at)
-                        }));
+                        found.extend(
+                            (0..self.blocks.len())
+                                .filter(|&one| self.next(one).any(|next| next == at)),
+                        );
                     }
                 }
             }
@@ -185,14 +186,14 @@ type Loops = BTreeMap<usize, BTreeSet<usize>>;
 /// A way through blocks. The usual one stores most and evaluates most; of such ways it is the shortest. So runs that
 /// need care, or a store that asks for each part, are no part of it.
 #[derive(Debug, Clone, Copy, Default)]
-struct Way {
+struct Trace {
     stores: usize,
     /// Blocks with the products of an evaluation, or with the division of a time that goes round.
     evaluations: usize,
     instructions: usize,
 }
 
-impl Way {
+impl Trace {
     fn and(self, other: Self) -> Self {
         Self {
             stores: self.stores + other.stores,
@@ -225,7 +226,7 @@ struct Walk<'a> {
 
 impl Walk<'_> {
     /// The usual way from a block to one that ends it.
-    fn from(&self, at: usize, ends: &dyn Fn(usize) -> bool) -> Option<Way> {
+    fn from(&self, at: usize, ends: &dyn Fn(usize) -> bool) -> Option<Trace> {
         self.search(at, at, ends, &mut BTreeMap::new())
     }
 
@@ -234,33 +235,35 @@ impl Walk<'_> {
         start: usize,
         at: usize,
         ends: &dyn Fn(usize) -> bool,
-        known: &mut BTreeMap<usize, Option<Way>>,
-    ) -> Option<Way> {
-        if let Some(way) = known.get(&at) {
-            return *way;
+        known: &mut BTreeMap<usize, Option<Trace>>,
+    ) -> Option<Trace> {
+        if let Some(trace) = known.get(&at) {
+            return *trace;
         }
         known.insert(at, None);
         let (step, next) = self.step(at);
-        let rest = next.into_iter().filter(|next| self.inside.contains(next) && *next != start);
+        let rest = next
+            .into_iter()
+            .filter(|next| self.inside.contains(next) && *next != start);
         let rest = rest.filter_map(|next| self.search(start, next, ends, known));
-        let rest = rest.chain(ends(at).then(Way::default));
-        let best = rest.max_by_key(Way::rank).map(|rest| step.and(rest));
+        let rest = rest.chain(ends(at).then(Trace::default));
+        let best = rest.max_by_key(Trace::rank).map(|rest| step.and(rest));
         known.insert(at, best);
         best
     }
 
     /// A block or a whole loop, and the blocks that may come next.
-    fn step(&self, at: usize) -> (Way, Vec<usize>) {
+    fn step(&self, at: usize) -> (Trace, Vec<usize>) {
         let Some(body) = self.loops.get(&at) else {
             let block = std::slice::from_ref(&self.listing.blocks[at]);
             let products = count(block, |name| name.starts_with("fmul"));
             let divisions = count(block, |name| name.starts_with("mufu.rcp"));
-            let way = Way {
+            let trace = Trace {
                 stores: count(block, is_store),
                 evaluations: usize::from(products > 8 || divisions > 0),
                 instructions: count(block, |_| true),
             };
-            return (way, self.listing.next(at).collect());
+            return (trace, self.listing.next(at).collect());
         };
         let once = self.listing.through(at, body, self.trips, self.loops);
         let next = body.iter().flat_map(|&one| self.listing.next(one));
@@ -385,21 +388,21 @@ fn compiled(
 /// The head of the table of docs/gpu.md with what is predicted for cards.
 const PREDICTIONS: &str = "| kernel | of 48 | of 200 |";
 
-/// A kernel over spread runs: the parts of a value and its bytes, the most instructions that a sample of a run of 200
-/// may take, and the time of a dispatch to be reached, µs.
+/// A kernel over spread runs: the parts of a value and its bytes, and the most instructions that a sample of a run of
+/// 200 may take.
 struct Goal {
     kernel: &'static str,
     parts: usize,
     bytes: usize,
-    most: Option<usize>,
+    max: Option<usize>,
 }
 
-const fn goal(kernel: &'static str, parts: usize, bytes: usize, most: Option<usize>) -> Goal {
+const fn goal(kernel: &'static str, parts: usize, bytes: usize, max: Option<usize>) -> Goal {
     Goal {
         kernel,
         parts,
         bytes,
-        most,
+        max,
     }
 }
 
@@ -429,7 +432,7 @@ impl Goal {
             if self.parts > 1 {
                 // The first and the last iteration of a run ask for each part, by a loop that stores one.
                 let trips = |stores| if stores > 1 { iterations } else { self.parts };
-                all += listing.usual(&trips) + 2 * self.parts * listing.storing_loop();
+                all += listing.typical(&trips) + 2 * self.parts * listing.storing_loop();
                 continue;
             }
             // As `spread/alone.wgsl` divides the iterations behind the first one.
@@ -438,13 +441,13 @@ impl Goal {
                 2 => pairs,
                 _ => iterations - 1 - 2 * pairs,
             };
-            all += listing.usual(&trips);
+            all += listing.typical(&trips);
         }
         (all * LANES).div_ceil(samples)
     }
 
-    /// The predicted time of a dispatch over 4096 tracks of 1200 frames on an H200, µs: what limits it are instructions,
-    /// so many a sample, and bytes that are written.
+    /// The predicted time of a dispatch over 4096 tracks of 1200 frames on an H200, µs. It is limited by the instructions
+    /// of each sample and by the bytes that are written.
     fn time(&self, instructions: usize) -> f64 {
         const SAMPLES: f64 = 4096.0 * 1200.0;
         let issued = 0.147 * instructions as f64;
@@ -466,17 +469,25 @@ fn samples_take_as_many_instructions_as_planned() {
     let (mut wrong, mut rows) = (Vec::new(), BTreeMap::new());
     for goal in &GOALS {
         let [short, long] = [48, 200].map(|n| goal.instructions(&listings[goal.kernel], n));
-        if goal.most.is_some_and(|most| long > most) {
-            wrong.push(format!("{}: {long} instructions, not {:?}", goal.kernel, goal.most));
+        if goal.max.is_some_and(|max| long > max) {
+            wrong.push(format!(
+                "{}: {long} instructions, not {:?}",
+                goal.kernel, goal.max
+            ));
         }
         let time = format!("{:.1}", goal.time(long));
         rows.insert(goal.kernel, vec![short.to_string(), long.to_string(), time]);
     }
     let crowd = instance_of_crowd(&listings[CROWD]);
-    if crowd > MOST_OF_INSTANCE {
-        wrong.push(format!("{CROWD}: {crowd} instructions, not {MOST_OF_INSTANCE}"));
+    if crowd > MAX_OF_INSTANCE {
+        wrong.push(format!(
+            "{CROWD}: {crowd} instructions, not {MAX_OF_INSTANCE}"
+        ));
     }
-    rows.insert(CROWD, vec!["-".to_owned(), crowd.to_string(), "-".to_owned()]);
+    rows.insert(
+        CROWD,
+        vec!["-".to_owned(), crowd.to_string(), "-".to_owned()],
+    );
     wrong.extend(table::check_rows(PREDICTIONS, &rows));
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
@@ -484,13 +495,13 @@ fn samples_take_as_many_instructions_as_planned() {
 const CROWD: &str = "crowd_subgroup_rotations";
 
 /// The most instructions of a warp for the rotations of an instance.
-const MOST_OF_INSTANCE: usize = 260;
+const MAX_OF_INSTANCE: usize = 260;
 
 /// The instructions of a warp for an instance of 60 joints, of four, that goes round a clip of 61 keys.
 fn instance_of_crowd(listing: &Listing) -> usize {
     // Eight lanes find one of 60 spans in two steps. Seven times all lanes have a joint, and then some.
     let trips = |stores| if stores == 0 { 2 } else { 7 };
-    listing.usual(&trips).div_ceil(4)
+    listing.typical(&trips).div_ceil(4)
 }
 
 #[test]

@@ -101,7 +101,9 @@ pub(super) fn check_rows(head: &str, measured: &BTreeMap<&str, Vec<String>>) -> 
         };
         if !compared.iter().zip(found).all(is_near) {
             let name = &documented[0];
-            wrong.push(format!("docs/gpu.md: {name} has {compared:?}, not {found:?}"));
+            wrong.push(format!(
+                "docs/gpu.md: {name} has {compared:?}, not {found:?}"
+            ));
         }
         let cells = [found, others].concat().join(" | ");
         *line = format!("| `{}` | {cells} |", documented[0]);

@@ -8,9 +8,9 @@ use crate::gpu::kernel_check::{Trial, trials};
 use crate::output::encoding::Encoding;
 use crate::shader::{
     ArcSegment, ArcsDispatch, CrowdBase, CrowdChange, CrowdChannel, CrowdClip, CrowdDispatch,
-    CrowdEntry, CrowdLink, CrowdPosition, CrowdSpan, CrowdSubgroupDispatch, END_NEGATED, Form, IS_CONSTANT, KERNELS,
-    Kernel, Link, List, ListedSample, PoseDispatch, ROTATION, SCALE, START_NEGATED, Store,
-    TRANSLATION, WORKGROUP,
+    CrowdEntry, CrowdLink, CrowdPosition, CrowdSpan, CrowdSubgroupDispatch, END_NEGATED, Form,
+    IS_CONSTANT, KERNELS, Kernel, Link, List, ListedSample, PoseDispatch, ROTATION, SCALE,
+    START_NEGATED, Store, TRANSLATION, WORKGROUP,
 };
 use crate::time::runs::Affine;
 use crate::twin::crowd_layers::Layers;
@@ -321,9 +321,9 @@ fn rotations_of_crowds_by_subgroups() {
         let (entries, clips) = (trial.input::<CrowdEntry>(0), trial.input::<CrowdClip>(1));
         let (bases, spans) = (trial.input::<CrowdBase>(2), trial.input::<CrowdSpan>(3));
         let entries = &entries[pushed.first_instance as usize..][..pushed.count as usize];
-        let most = clips.iter().map(|clip| clip.bases).max().unwrap();
-        let mut positions = vec![CrowdPosition::zeroed(); entries.len() * most as usize];
-        let of_instances = positions.chunks_mut(most as usize);
+        let max_bases = clips.iter().map(|clip| clip.bases).max().unwrap();
+        let mut positions = vec![CrowdPosition::zeroed(); entries.len() * max_bases as usize];
+        let of_instances = positions.chunks_mut(max_bases as usize);
         for (entry, found) in entries.iter().zip(of_instances) {
             crowd_times::base_positions(entry, clock, &clips, &bases, &spans, found);
         }
@@ -334,7 +334,7 @@ fn rotations_of_crowds_by_subgroups() {
             positions: &positions,
             joints: pushed.joints,
             layers: 1,
-            bases: most,
+            bases: max_bases,
             masks: 0,
             references: 0,
         };

@@ -4,7 +4,8 @@ use crate::math::canonical::canonical;
 use crate::output::crowd::{CrowdOutput, CrowdValues};
 use crate::shader::{
     CHANNELS, CrowdBase, CrowdChannel, CrowdClip, CrowdDispatch, CrowdEntry, CrowdSpan,
-    CrowdWholeDispatch, FORM_ARC, FORM_CUBIC, Kernel, ON_KEY, ROTATION, SPEED_MAGNITUDE, START_BIAS,
+    CrowdWholeDispatch, FORM_ARC, FORM_CUBIC, Kernel, ON_KEY, ROTATION, SPEED_MAGNITUDE,
+    START_BIAS,
 };
 use crate::twin::crowd_matrices::Rows;
 use crate::work::subgroup_instances::SubgroupInstances;
@@ -28,7 +29,9 @@ pub(super) fn trials(kernel: Kernel, random: &mut Random) -> Vec<Trial> {
     use CrowdValues::{Local, Model, Rotations, Skinning};
     if kernel == Kernel::CrowdSubgroupRotations {
         // Two instances of two time bases, and one of them, with the fewest lanes.
-        return [2, 1].map(|instances| of_subgroups(random, instances)).into();
+        return [2, 1]
+            .map(|instances| of_subgroups(random, instances))
+            .into();
     }
     let is_plain = matches!(
         kernel,
@@ -106,7 +109,11 @@ const CELL_TABLES: [u32; 2] = [CELLS, CELLS + MASKS * JOINTS];
 
 impl WholeScene {
     fn new(random: &mut Random, is_plain: bool, size: &Size) -> Self {
-        let &Size { joints, spans: most_spans, cells } = size;
+        let &Size {
+            joints,
+            spans: max_spans,
+            cells,
+        } = size;
         let layers = if is_plain { 1 } else { 4 };
         let (mut clips, mut bases, mut spans) = (Vec::new(), Vec::new(), Vec::new());
         for clip in 0..CLIPS {
@@ -118,13 +125,17 @@ impl WholeScene {
                 bases: base_count,
             });
             for _ in 0..base_count {
-                let count = 1 + random.below(most_spans);
+                let count = 1 + random.below(max_spans);
                 bases.push(CrowdBase {
                     first: spans.len() as u32,
                     count,
-                    step: if count < 2 { 0 } else { 1 << (count - 1).ilog2() },
+                    step: if count < 2 {
+                        0
+                    } else {
+                        1 << (count - 1).ilog2()
+                    },
                 });
-                let starts = (1..most_spans).map(|_| random.below(period));
+                let starts = (1..max_spans).map(|_| random.below(period));
                 let mut starts = Vec::from_iter(starts);
                 starts.truncate(count as usize - 1);
                 starts.push(0);
