@@ -104,7 +104,7 @@ fn recipes_name_files_packages_and_commands_that_exist() {
     }
     let flake = recipe("nix/flake.nix");
     assert!(flake.contains(&format!("\"-p\" \"{}\"", env!("CARGO_PKG_NAME"))));
-    // What the port installs is what the script makes.
+    // The port installs the folder that the script makes.
     let (port, library) = (recipe("vcpkg/portfile.cmake"), read("scripts/library.sh"));
     assert!(library.contains("name=libtumble-$version-$host"));
     assert!(port.contains("target/library/libtumble-@VERSION@-*"));
