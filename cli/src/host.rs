@@ -44,12 +44,9 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     words::explain_panics();
     let raw: Vec<OsString> = arguments.into_iter().collect();
     let mut command = Arguments::command();
-    let parsed = command.try_get_matches_from_mut(&raw).and_then(|matches| {
-        Ok((
-            Arguments::from_arg_matches(&matches)?,
-            json_form(&matches),
-        ))
-    });
+    let parsed = command
+        .try_get_matches_from_mut(&raw)
+        .and_then(|matches| Ok((Arguments::from_arg_matches(&matches)?, json_form(&matches))));
     let (arguments, json_form) = match parsed {
         Ok(parsed) => parsed,
         Err(error) => {

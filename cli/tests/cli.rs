@@ -57,7 +57,7 @@ fn npy_holds_the_library_s_bits_in_every_layout_and_order() {
             let run = succeed(folder.path(), &line);
             assert!(
                 run.words
-                    .contains("2 tracks × 51 frames (25 fps, because its keys have no rate), bessel-overhauser, on "),
+                    .contains("2 tracks × 51 frames (25 fps, because its keys have no rate), authored (bessel-overhauser), on "),
                 "{}",
                 run.words
             );

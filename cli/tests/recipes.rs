@@ -31,7 +31,7 @@ fn field(name: &str) -> String {
 }
 
 /// The names between two `@` in a text.
-fn places(text: &str) -> BTreeSet<&str> {
+fn fields_in(text: &str) -> BTreeSet<&str> {
     let is_name = |part: &&str| {
         let is_letter = |c: char| c.is_ascii_uppercase() || c.is_ascii_digit() || c == '_';
         !part.is_empty() && part.chars().all(is_letter)
@@ -44,13 +44,13 @@ fn recipes_have_the_version_the_licence_and_the_description_of_cargo_toml() {
     let [version, license, description] = ["version", "license", "description"].map(field);
     assert_eq!(version, env!("CARGO_PKG_VERSION"));
     let script = read("scripts/recipes.sh");
-    let filled = places(&script);
+    let filled = fields_in(&script);
     for path in FILLED {
         let text = recipe(path);
         assert!(script.contains(path), "{path} is not filled in");
-        let unknown: Vec<&str> = places(&text).difference(&filled).copied().collect();
+        let unknown: Vec<&str> = fields_in(&text).difference(&filled).copied().collect();
         assert!(unknown.is_empty(), "{path}: {unknown:?} have no value");
-        assert!(places(&text).contains("VERSION"), "{path}");
+        assert!(fields_in(&text).contains("VERSION"), "{path}");
         for fixed in [&version, &license, &description] {
             assert!(
                 !text.contains(fixed.as_str()),
@@ -104,7 +104,7 @@ fn recipes_name_files_packages_and_commands_that_exist() {
     }
     let flake = recipe("nix/flake.nix");
     assert!(flake.contains(&format!("\"-p\" \"{}\"", env!("CARGO_PKG_NAME"))));
-    // What the port installs is what the script makes.
+    // The port installs the folder that the script makes.
     let (port, library) = (recipe("vcpkg/portfile.cmake"), read("scripts/library.sh"));
     assert!(library.contains("name=libtumble-$version-$host"));
     assert!(port.contains("target/library/libtumble-@VERSION@-*"));

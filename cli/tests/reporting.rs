@@ -171,7 +171,11 @@ fn a_command_that_fails_before_its_results_prints_its_failure_as_json() {
         assert_eq!(run.code, code, "{line}: {}", run.words);
         let json: serde_json::Value = serde_json::from_slice(&run.out).unwrap();
         // In the form of the command's results: a list, or one object.
-        let json = if json.is_array() { json[0].clone() } else { json };
+        let json = if json.is_array() {
+            json[0].clone()
+        } else {
+            json
+        };
         assert_eq!(
             (&json["state"], &json["code"]),
             (&"failed".into(), &code.into())
@@ -190,13 +194,13 @@ fn patterns_that_leave_nothing_out_are_told() {
     let folder = sample_folder();
     let line = "eval folder b.dat -o out --exclude b.* --exclude *_draft.dat -n";
     let run = succeed(folder.path(), &words(line));
-    let told: Vec<&str> = run
+    let warned: Vec<&str> = run
         .words
         .lines()
         .filter(|line| line.contains("--exclude"))
         .collect();
     assert_eq!(
-        told,
+        warned,
         [
             "warning: --exclude '*_draft.dat' leaves nothing out: no name of a file or a folder matches it"
         ]

@@ -841,8 +841,8 @@ fn scalars_are_compared_one_by_one_and_told_where_they_are_not_drawn() {
         "render take.csv -o o.png",
     ] {
         let drawn = line(folder, &format!("{drawing} --robot robot.xml --device cpu"));
-        let told = "take.csv: 4 scalars are not drawn";
-        assert!(drawn.words.contains(told), "{drawing}: {}", drawn.words);
+        let note = "take.csv: 4 scalars are not drawn";
+        assert!(drawn.words.contains(note), "{drawing}: {}", drawn.words);
     }
     let unnamed = line(folder, "info take.csv");
     let both = String::from_utf8(unnamed.out).unwrap() + &unnamed.words;

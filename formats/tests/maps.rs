@@ -421,8 +421,8 @@ fn tables_of_others_have_their_values() {
         let found = clip.rate.or_else(|| clip.rate_of_keys());
         assert_eq!(found, tumble::FrameRate::new(rate, 1).ok(), "{name}");
         assert_eq!(positions(&loaded)[1], second, "{name}");
-        let turned = track.keys[0].angle_between(track.keys[1]).to_degrees();
-        assert!((turned - 1.0).abs() < 0.05, "{name}: {turned}");
+        let degrees = track.keys[0].angle_between(track.keys[1]).to_degrees();
+        assert!((degrees - 1.0).abs() < 0.05, "{name}: {degrees}");
     }
 }
 

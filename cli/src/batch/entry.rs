@@ -52,7 +52,7 @@ pub(crate) struct ManifestEntry {
     pub(crate) warnings: Vec<RecordedWarning>,
 }
 
-/// What a result's frames assume or leave out, in a manifest and in JSON.
+/// Assumptions about the frames of a result, and times that they leave out, in a manifest and in JSON.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct FrameNotes {
     /// The frames a second, where they were assumed, because the keys have no rate.

@@ -36,7 +36,7 @@ pub(crate) struct PlannedWork<'a> {
     pub(crate) options: &'a ResultOptions,
 }
 
-/// What a batch would do.
+/// The results that a batch would write, skip and remove.
 #[derive(Default)]
 pub(crate) struct Preview {
     pub(crate) results: Vec<PreviewedResult>,

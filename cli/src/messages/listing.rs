@@ -53,7 +53,7 @@ pub(crate) fn begin() {
     HAS_JSON.store(false, Ordering::Relaxed);
 }
 
-/// What a command prints with `--json`.
+/// The form of the JSON that a command prints.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum JsonForm {
     Object,
