@@ -239,8 +239,8 @@ fn a_part_of_an_animation_has_its_weights() {
 #[test]
 fn weights_at_other_times_do_not_keep_joints_from_being_written() {
     let mut clip = read_face(&face()).clips.remove(0);
-    let turn = [tumble::glam::Quat::IDENTITY; 2];
-    clip.set.push("head", &[0.0, 1.0], &turn).unwrap();
+    let keys = [tumble::glam::Quat::IDENTITY; 2];
+    clip.set.push("head", &[0.0, 1.0], &keys).unwrap();
     let (samples, is_at_keys) = keys_for(&clip, Format::named("bvh").unwrap(), false).unwrap();
     assert!(!is_at_keys);
     assert_eq!((samples.times, samples.scalars.len()), (vec![0.0, 1.0], 10));

@@ -185,9 +185,9 @@ pub(crate) fn root_motion<'py>(
         upright.extend(order.of_xyzw(rotation.to_array()));
     }
     let py = positions.py();
-    let places = motion.positions.iter().flat_map(DVec3::to_array).collect();
+    let ground_points = motion.positions.iter().flat_map(DVec3::to_array).collect();
     let all = [
-        array(py, places, vec![count, 3])?,
+        array(py, ground_points, vec![count, 3])?,
         array(py, motion.headings, vec![count])?,
         array(py, still, vec![count, 3])?,
         array(py, upright, vec![count, 4])?,
@@ -231,9 +231,9 @@ pub(crate) fn root_after_loops<'py>(
     };
     let motion = motion.after_loops(loops);
     let py = positions.py();
-    let places = motion.positions.iter().flat_map(DVec3::to_array).collect();
+    let ground_points = motion.positions.iter().flat_map(DVec3::to_array).collect();
     let all = [
-        array(py, places, with(&shape, 3))?,
+        array(py, ground_points, with(&shape, 3))?,
         array(py, motion.headings, shape)?,
     ];
     PyTuple::new(py, all)

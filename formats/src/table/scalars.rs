@@ -9,7 +9,7 @@ use crate::motion::{ChannelInterpolation, Motion, Scalar};
 /// The key of the metadata; for one clip of several, its number may follow: `scalars.1`.
 const KEY: &str = "scalars";
 
-/// What a column of a scalar does not say, by the name of the column.
+/// The parts of a scalar that its column does not say.
 #[derive(Debug, PartialEq, Serialize, Deserialize)]
 struct ScalarNote {
     #[serde(default, skip_serializing_if = "Option::is_none")]
