@@ -243,6 +243,55 @@ const SOME: [Method; 4] = [
     method::CATMULL_ROM,
 ];
 
+/// Crowds of one layer of arcs, whose instances have one time base or several: on cards subgroups evaluate them.
+#[test]
+fn crowds_of_arcs_have_the_bits_of_the_cpu() {
+    const JOINTS: usize = 16;
+    const INSTANCES: usize = 37;
+    let mut random = Random(11);
+    for shares_times in [true, false] {
+        let mut library = CrowdLibrary::new(&skeleton(&mut random, JOINTS)).unwrap();
+        for keys in [9, 61] {
+            let mut set = clip(&mut random, JOINTS, keys);
+            if shares_times {
+                let times: Vec<f64> = (0..keys).map(|key| key as f64 / 8.0).collect();
+                set = TrackSet::new();
+                for _ in 0..JOINTS {
+                    let first = random.rotation().as_quat();
+                    let later = |key: usize| first * Quat::from_rotation_y(0.4 * key as f32);
+                    let rotations: Vec<Quat> = (0..keys).map(later).collect();
+                    set.push("", &times, &rotations).unwrap();
+                }
+            }
+            library
+                .push(&set, method::SLERP, VectorMethod::Linear)
+                .unwrap();
+        }
+        let mut all = crowds(&library, INSTANCES, 1);
+        let layers: Vec<_> = (0..INSTANCES)
+            .map(|_| layer(&mut random, &library))
+            .collect();
+        let plays = |layer: &CrowdLayer| CrowdLayer {
+            mask: None,
+            additive: false,
+            ..*layer
+        };
+        for ticks in [0, 11_760, 1 << 33] {
+            let mut expected = None;
+            for (name, crowd) in &mut all {
+                if ticks == 0 {
+                    let slots = layers.iter().map(plays).enumerate();
+                    slots.for_each(|(slot, layer)| crowd.set(slot, 0, layer).unwrap());
+                }
+                crowd.advance_ticks(ticks).unwrap();
+                let found = bits(&evaluated(crowd, CrowdValues::Rotations));
+                let expected = expected.get_or_insert_with(|| found.clone());
+                assert!(found == *expected, "{name}, {shares_times}, {ticks}");
+            }
+        }
+    }
+}
+
 /// Random libraries, instances, layers, wrap modes and times: the same bits everywhere, when some
 /// instances change and when only the clock moves.
 #[test]

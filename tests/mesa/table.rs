@@ -105,7 +105,7 @@ pub(super) fn check_rows(head: &str, measured: &BTreeMap<&str, Vec<String>>) -> 
                 "docs/gpu.md: {name} has {compared:?}, not {found:?}"
             ));
         }
-        let cells = [found, others].concat().join(" | ");
+        let cells = [&found[..], others].concat().join(" | ");
         *line = format!("| `{}` | {cells} |", documented[0]);
     }
     assert_eq!(rows, measured.len(), "rows of the table {head}");
