@@ -63,6 +63,8 @@ __all__ = [
     "panic",
     "path_errors",
     "positions_of_humanml3d",
+    "root_after_loops",
+    "root_motion",
     "reduce",
     "referred_files",
     "represent",
