@@ -64,7 +64,7 @@ fn check(file: &str, clip: &Motion, of: &str) {
         .set
         .vector_keys(tumble::Channel::Translation, 0)
         .unwrap();
-    let found: Vec<f32> = keys.keys.iter().flat_map(tumble::glam::Vec3::to_array).collect();
+    let found: Vec<f32> = keys.keys.iter().flat_map(Vec3::to_array).collect();
     let stored = |name: &str| -> Vec<f32> { expected(name).iter().map(|&n| n as f32).collect() };
     assert_near(file, &found, &stored(&positions));
     let rotation =
@@ -184,11 +184,7 @@ fn at_rate(file: &str, rate: u64) -> Loaded {
 
 fn positions(clip: &Motion, track: usize) -> Vec<f32> {
     let keys = clip.set.vector_keys(tumble::Channel::Translation, track);
-    keys.unwrap()
-        .keys
-        .iter()
-        .flat_map(tumble::glam::Vec3::to_array)
-        .collect()
+    keys.unwrap().keys.iter().flat_map(Vec3::to_array).collect()
 }
 
 /// The numbers of a pickle, as they are stored.

@@ -67,6 +67,8 @@ __all__ = [
     "referred_files",
     "represent",
     "retarget",
+    "root_after_loops",
+    "root_motion",
     "rotations_of_six",
     "run",
     "save",

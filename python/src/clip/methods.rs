@@ -394,8 +394,8 @@ impl Clip {
     /// >>> clip.root_motion("in-place").translations(0)[1]
     /// array([[0., 1., 0.],
     ///        [0., 1., 0.]], dtype=float32)
-    /// >>> clip.root_motion("extract").names
-    /// ['root_motion', '']
+    /// >>> clip.root_motion("extract").parents
+    /// [None, 0]
     #[pyo3(signature = (rule, *, up="y", axis=None, joint=None))]
     fn root_motion(
         &self,
