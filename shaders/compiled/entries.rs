@@ -2205,8 +2205,8 @@ pub(crate) fn invocation_index<M: Machine>(
 /// Whether a condition holds in any lane.
 pub(crate) async fn is_any<M: Machine>(machine: &M, condition: bool) -> bool {
     let _block = machine.block(line!(), 3);
-    let holds = ballot(machine, condition).await;
-    holds[0] | holds[1] != 0u32
+    let votes = ballot(machine, condition).await;
+    votes[0] | votes[1] != 0u32
 }
 
 pub(crate) fn item_at_item<M: Machine>(machine: &M, index: u32) -> Item<M::F> {

@@ -115,8 +115,8 @@ fn main(
 
 // Whether a condition holds in any lane.
 fn is_any(condition: bool) -> bool {
-    let holds = subgroupBallot(condition);
-    return (holds.x | holds.y) != 0u;
+    let votes = subgroupBallot(condition);
+    return (votes.x | votes.y) != 0u;
 }
 
 // The numbers that a lane found, and what leads to those of others.
