@@ -11,6 +11,7 @@ use crate::gpu::device::{LogicalDevice, QueueLane};
 use crate::gpu::pipeline::Pipeline;
 use crate::machine::error::VulkanError;
 use crate::machine::error::calls::Named;
+use crate::names::fields::with_fields;
 use crate::shader::Kernel;
 use crate::work::recording::{Bytes, Recording, Resource, Slice, Step, Users};
 
@@ -162,7 +163,8 @@ fn found(memory: &[Binding], slice: &Slice) -> Binding {
 }
 
 /// Users of a device's memory among an application's commands.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[non_exhaustive]
 pub enum CommandUsers {
     /// All commands.
     #[default]
@@ -180,12 +182,19 @@ pub enum CommandUsers {
 /// Between which of an application's commands a target is recorded. Its commands wait for those before them and
 /// their writes, and those after them see its results. Fewer users are waited for in less time: all commands, the
 /// default, wait for drawing, too.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[non_exhaustive]
 pub struct CommandScopes {
     /// The users before it of its inputs and of the memory of its result.
     pub before: CommandUsers,
     /// The users after it of its result.
     pub after: CommandUsers,
+}
+
+with_fields! {
+    CommandScopes:
+    with_before(before: CommandUsers),
+    with_after(after: CommandUsers),
 }
 
 impl CommandScopes {

@@ -3,7 +3,7 @@
 use glam::{DVec3, Quat, Vec3};
 use tumble::reference::{ReferenceCurve, angle_between};
 use tumble::verify::error_bound;
-use tumble::{Axes, Interpolation, Quantity, TrackSet};
+use tumble::{Axes, Quantity, TrackSet};
 use tumble_formats::printable::printable;
 
 use crate::arguments::device::OpenedDevice;
@@ -244,10 +244,7 @@ impl PlotSource<'_> {
         let mut curves = Vec::new();
         for (order, &choice) in self.choices.iter().enumerate() {
             let interpolation = self.interpolation(choice, index);
-            let velocity = Interpolation {
-                quantity: Quantity::Velocity(Axes::Body),
-                ..interpolation
-            };
+            let velocity = interpolation.with_quantity(Quantity::Velocity(Axes::Body));
             let velocities = self.rates(device, index, velocity)?;
             let velocities = velocities.as_slice().iter();
             let speeds = velocities.map(|v| f64::from(v.truncate().length()));
