@@ -7,7 +7,7 @@
 use divan::Bencher;
 use divan::counter::ItemsCount;
 use glam::Quat;
-use tumble::crowd::{CrowdLayer, CrowdLibrary, CrowdValues};
+use tumble::crowd::{CrowdLayer, CrowdLibrary, CrowdValues, LayerBlend};
 use tumble::{
     Device, Encoding, Engine, EngineOptions, Layout, METHODS, SampleTimes, Skeleton, TrackSet,
     VectorMethod, method,
@@ -90,16 +90,16 @@ fn encode(bencher: Bencher<'_, '_>, encoding: Encoding) {
 /// A frame of a crowd, each character at a different time in a clip of arcs, per joint.
 #[divan::bench(args = [CrowdValues::Rotations, CrowdValues::Model])]
 fn crowd(bencher: Bencher<'_, '_>, values: CrowdValues) {
-    frame_of_crowd(bencher, values, 1, false);
+    frame_of_crowd(bencher, values, 1, LayerBlend::Over);
 }
 
 /// The same with a second layer over the first, as in a fade, and with one that is added.
-#[divan::bench(args = [false, true])]
-fn crowd_of_two_layers(bencher: Bencher<'_, '_>, additive: bool) {
-    frame_of_crowd(bencher, CrowdValues::Rotations, 2, additive);
+#[divan::bench(args = LayerBlend::ALL)]
+fn crowd_of_two_layers(bencher: Bencher<'_, '_>, blend: LayerBlend) {
+    frame_of_crowd(bencher, CrowdValues::Rotations, 2, blend);
 }
 
-fn frame_of_crowd(bencher: Bencher<'_, '_>, values: CrowdValues, layers: usize, additive: bool) {
+fn frame_of_crowd(bencher: Bencher<'_, '_>, values: CrowdValues, layers: usize, blend: LayerBlend) {
     const CHARACTERS: usize = 1000;
     let skeleton = Skeleton::chain(TRACKS / 4, 0.1).expect("a skeleton");
     let mut library = CrowdLibrary::new(&skeleton).expect("joints");
@@ -114,7 +114,7 @@ fn frame_of_crowd(bencher: Bencher<'_, '_>, values: CrowdValues, layers: usize, 
         crowd.set(instance, 0, plays).expect("an instance");
         if layers > 1 {
             let mut above = plays.at(instance as i64 * 7_919);
-            (above.weight, above.additive) = (0.3, additive);
+            (above.weight, above.blend) = (0.3, blend);
             crowd.set(instance, 1, above).expect("an instance");
         }
     }

@@ -12,7 +12,7 @@ use std::error::Error;
 
 use ash::vk;
 use glam::Quat;
-use tumble::vulkan::{PosePass, VulkanBuffer, VulkanHandles};
+use tumble::vulkan::{PosePass, VulkanBuffer, VulkanHandles, VulkanQueue};
 use tumble::{
     Clip, Device, Engine, EngineOptions, Layout, SampleTimes, Skeleton, TrackSet, ash, glam, method,
 };
@@ -116,20 +116,15 @@ impl Renderer {
     }
 
     fn engine(&self) -> Result<Engine, tumble::Error> {
-        let handles = VulkanHandles {
-            entry: self.entry.clone(),
-            instance: self.instance.clone(),
-            api_version: vk::API_VERSION_1_1,
-            physical_device: self.physical_device,
-            device: self.device.clone(),
-            shader_float_controls: false,
-            shader_int64: self.has_int64,
-            queue: self.compute.0,
-            queue_family: self.compute.1,
-            copy_queue: None,
-            queue_lock: None,
-            pipeline_cache: None,
-        };
+        let mut handles = VulkanHandles::new(
+            self.entry.clone(),
+            self.instance.clone(),
+            vk::API_VERSION_1_1,
+            self.physical_device,
+            self.device.clone(),
+            VulkanQueue::new(self.compute.0, self.compute.1),
+        );
+        handles.shader_int64 = self.has_int64;
         // SAFETY: the handles belong together, and `main` closes the engine before them.
         unsafe { Engine::from_vulkan(handles, &EngineOptions::default()) }
     }
@@ -249,11 +244,7 @@ fn clip(speed: f32) -> Result<TrackSet, Box<dyn Error>> {
 
 /// Writes the poses of one moment into the renderer's buffer.
 fn pose(clip: &Clip, time: f64, buffer: vk::Buffer) -> Result<(), tumble::Error> {
-    let range = VulkanBuffer {
-        buffer,
-        offset: 0,
-        size: SIZE,
-    };
+    let range = VulkanBuffer::new(buffer, SIZE);
     let frames = SampleTimes::at(vec![time]);
     // SAFETY: the buffer is the device's, has memory and these usages, and nothing else uses it until
     // this returns: `draw` waits for its fence.
@@ -273,11 +264,7 @@ fn mixed_in_world(
     time: f64,
     [(buffer, _), (seen, seen_memory)]: [(vk::Buffer, vk::DeviceMemory); 2],
 ) -> Result<Vec<[f32; 4]>, Box<dyn Error>> {
-    let range = |index: u64, size| VulkanBuffer {
-        buffer,
-        offset: index * STEP,
-        size,
-    };
+    let range = |index: u64, size| VulkanBuffer::new(buffer, size).at(index * STEP);
     let [from, to, local] = [0, 1, 2].map(|index| range(index, SIZE));
     let world = range(3, WORLD);
     let engine = walk.engine();

@@ -16,7 +16,7 @@ use std::time::{Duration, Instant};
 use ash::vk;
 use glam::{Quat, Vec3};
 use tumble::crowd::{Crowd, CrowdLayer, CrowdLibrary, CrowdValues};
-use tumble::vulkan::{CrowdTarget, VulkanBuffer, VulkanHandles};
+use tumble::vulkan::{CrowdTarget, VulkanBuffer, VulkanHandles, VulkanQueue};
 use tumble::{
     Device, Engine, EngineOptions, Skeleton, TrackSet, VectorMethod, WrapMode, ash, glam, method,
 };
@@ -100,10 +100,9 @@ fn library() -> Result<CrowdLibrary, Box<dyn Error>> {
 /// Sets a clip, a time and a speed for every instance.
 fn start(crowd: &mut Crowd) -> Result<(), Box<dyn Error>> {
     for instance in 0..crowd.instance_count() {
-        let plays = CrowdLayer {
-            speed: 0.8 + 0.05 * (instance % 9) as f32,
-            ..CrowdLayer::new(instance % CLIPS).at(instance as i64 * 9_973)
-        };
+        let plays = CrowdLayer::new(instance % CLIPS)
+            .at(instance as i64 * 9_973)
+            .with_speed(0.8 + 0.05 * (instance % 9) as f32);
         crowd.set(instance, 0, plays)?;
     }
     Ok(())
@@ -113,10 +112,7 @@ fn start(crowd: &mut Crowd) -> Result<(), Box<dyn Error>> {
 fn go_on(crowd: &mut Crowd, frame: usize) -> Result<(), Box<dyn Error>> {
     crowd.advance(1.0 / 60.0)?;
     for instance in (frame % 100..crowd.instance_count()).step_by(100) {
-        let plays = CrowdLayer {
-            wrap: WrapMode::Mirror,
-            ..CrowdLayer::new((instance + frame) % CLIPS)
-        };
+        let plays = CrowdLayer::new((instance + frame) % CLIPS).with_wrap(WrapMode::Mirror);
         crowd.set(instance, 0, plays)?;
     }
     Ok(())
@@ -200,20 +196,15 @@ impl Renderer {
     }
 
     fn engine(&self) -> Result<Engine, tumble::Error> {
-        let handles = VulkanHandles {
-            entry: self.entry.clone(),
-            instance: self.instance.clone(),
-            api_version: vk::API_VERSION_1_1,
-            physical_device: self.physical_device,
-            device: self.device.clone(),
-            shader_float_controls: false,
-            shader_int64: self.has_int64,
-            queue: self.queue,
-            queue_family: self.family,
-            copy_queue: None,
-            queue_lock: None,
-            pipeline_cache: None,
-        };
+        let mut handles = VulkanHandles::new(
+            self.entry.clone(),
+            self.instance.clone(),
+            vk::API_VERSION_1_1,
+            self.physical_device,
+            self.device.clone(),
+            VulkanQueue::new(self.queue, self.family),
+        );
+        handles.shader_int64 = self.has_int64;
         // SAFETY: the handles belong together, and `main` closes the engine before them.
         unsafe { Engine::from_vulkan(handles, &EngineOptions::default()) }
     }
@@ -319,11 +310,7 @@ fn on_device(
     }
     // Kernels are compiled here, while a level loads.
     let target = |slot: &Slot| -> Result<CrowdTarget, tumble::crowd::CrowdError> {
-        let range = VulkanBuffer {
-            buffer: slot.buffer,
-            offset: 0,
-            size,
-        };
+        let range = VulkanBuffer::new(slot.buffer, size);
         // SAFETY: the buffer is the device's, has memory and this usage, and outlives the target.
         unsafe { crowd.target(values, range) }
     };

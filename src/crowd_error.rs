@@ -193,6 +193,14 @@ pub enum CrowdError {
         /// The number of the result's values.
         needed: usize,
     },
+    /// Poses end within an instance.
+    #[error("{length} vectors are no whole number of poses, which have {each} each")]
+    PartOfPose {
+        /// The number of vectors of four numbers.
+        length: usize,
+        /// The number of vectors of one pose: three for each joint.
+        each: usize,
+    },
     /// The output's precision differs from the submitted result's.
     #[error(
         "the submitted result has numbers of {} bits; take it with {}",

@@ -10,6 +10,7 @@ use crate::machine::reports::{DeviceInfo, DeviceKind};
 
 /// The device on which an engine evaluates: the CPU, or one Vulkan device.
 #[derive(Clone)]
+#[non_exhaustive]
 pub enum Device {
     /// The CPU: the f32 twins of the shaders, on all cores.
     Cpu,
@@ -31,6 +32,14 @@ impl VulkanDevice {
     }
 }
 
+impl std::fmt::Debug for VulkanDevice {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_tuple("VulkanDevice")
+            .field(&self.info().name)
+            .finish()
+    }
+}
+
 impl Device {
     /// Lists every Vulkan device that can compute, fastest kind first. The CPU is always available and not listed.
     ///
@@ -40,7 +49,7 @@ impl Device {
     /// # Errors
     /// When there is no Vulkan loader or no driver, or the loader fails.
     pub fn list() -> Result<Vec<Self>, VulkanError> {
-        Self::list_with(false)
+        Self::of_loader(false)
     }
 
     /// The first Vulkan device of [`Device::list`], for tests. If there is none, this is an error, so that no test
@@ -66,7 +75,12 @@ impl Device {
     ///
     /// # Errors
     /// As [`Device::list`]; also when the layer is not installed.
-    pub fn list_with(validation: bool) -> Result<Vec<Self>, VulkanError> {
+    pub fn list_validated() -> Result<Vec<Self>, VulkanError> {
+        Self::of_loader(true)
+    }
+
+    /// The devices of the Vulkan loader, with the validation layer or without.
+    fn of_loader(validation: bool) -> Result<Vec<Self>, VulkanError> {
         let vulkan = |listed| Self::Vulkan(VulkanDevice { listed });
         Ok(listed(validation)?.into_iter().map(vulkan).collect())
     }

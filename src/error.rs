@@ -19,7 +19,7 @@ use crate::tracks::error::TrackError;
 use crate::tracks::per_track::PerTrackCountError;
 
 /// Why an evaluation failed.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
     /// The sample times do not fit the set.
@@ -149,7 +149,7 @@ pub enum Error {
     BufferOfOther,
     /// The environment variable `TUMBLE_VECTOR_WIDTH` is not the name of a vector width.
     #[error("TUMBLE_VECTOR_WIDTH: {0}")]
-    VectorWidth(#[from] UnknownNameError),
+    VectorWidth(UnknownNameError),
     /// The number of worker threads is out of range.
     #[error(
         "{requested} worker threads were asked for; give 1 to {max}, or none for the shared ones"

@@ -62,7 +62,7 @@
 //! * **Correctness on your machine**: [`verify::verify`] compares a device with the CPU, bit for bit, and both with
 //!   [`mod@reference`].
 //!
-//! [`glam`] and [`ash`] are re-exported in the versions that this crate uses. Functions that take [`glam::Quat`] also
+//! [`glam`], [`bytemuck`] and [`ash`] are re-exported in the versions that this crate uses. Functions that take [`glam::Quat`] also
 //! take `[f32; 4]`, `x y z w`.
 //!
 //! # Guarantees
@@ -261,6 +261,7 @@ pub mod vulkan {
 
 #[cfg(feature = "vulkan")]
 pub use ash;
+pub use bytemuck;
 pub use glam;
 
 /// The examples of the README and of the guide are compiled and run as tests.

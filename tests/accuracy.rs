@@ -177,10 +177,7 @@ fn slerp_is_within_its_bounds_the_long_way_too() {
         let keys: Vec<Quat> = track.keys.iter().map(|&key| key * sign()).collect();
         set.push("", track.times, &keys).unwrap();
     }
-    let interpolation = Interpolation {
-        signs: KeySigns::AsAuthored,
-        ..tumble::method::SLERP.into()
-    };
+    let interpolation = Interpolation::from(tumble::method::SLERP).with_signs(KeySigns::AsAuthored);
     for fps in RATES {
         let frames = SampleTimes::rate(rate(fps));
         assert_within_bounds(&set, interpolation, &frames, "the long way");
@@ -271,16 +268,10 @@ fn every_option_is_within_the_bounds() {
             },
             Ends::Frozen,
         ] {
-            let interpolation = Interpolation {
-                ends,
-                ..method.into()
-            };
+            let interpolation = Interpolation::from(method).with_ends(ends);
             assert_within_bounds(&set, interpolation, &SampleTimes::fps(60), "ends");
         }
-        let interpolation = Interpolation {
-            signs: KeySigns::AsAuthored,
-            ..method.into()
-        };
+        let interpolation = Interpolation::from(method).with_signs(KeySigns::AsAuthored);
         assert_within_bounds(&set, interpolation, &SampleTimes::fps(60), "as authored");
     }
     let mut closed = TrackSet::new();
@@ -290,10 +281,7 @@ fn every_option_is_within_the_bounds() {
         closed.push("", track.times, &keys).unwrap();
     }
     for method in METHODS {
-        let interpolation = Interpolation {
-            ends: Ends::Loop,
-            ..method.into()
-        };
+        let interpolation = Interpolation::from(method).with_ends(Ends::Loop);
         assert_within_bounds(&closed, interpolation, &SampleTimes::fps(60), "loop");
     }
 }
@@ -316,13 +304,7 @@ fn keys_are_reproduced_exactly() {
         }
         for method in METHODS.into_iter().filter(|method| method.interpolates) {
             for ends in [Ends::Parabolic, Ends::Natural, Ends::Frozen] {
-                let clip = clip(
-                    &set,
-                    Interpolation {
-                        ends,
-                        ..method.into()
-                    },
-                );
+                let clip = clip(&set, Interpolation::from(method).with_ends(ends));
                 let frames = clip.evaluate(&SampleTimes::fps(25)).unwrap();
                 let times = clip
                     .evaluate(&SampleTimes::at(set.track(0).times.to_vec()))
@@ -401,10 +383,7 @@ fn keys_next_to_nothing_apart_give_unit_quaternions() {
             samples.extend([0.1, 0.5, 0.9, 1.0 + 1e-9, 1.5, 1e20]);
             for method in METHODS {
                 for ends in [Ends::Parabolic, Ends::Natural] {
-                    let interpolation = Interpolation {
-                        ends,
-                        ..method.into()
-                    };
+                    let interpolation = Interpolation::from(method).with_ends(ends);
                     let clip = clip(&set, interpolation);
                     let found = clip.evaluate(&SampleTimes::at(samples.clone())).unwrap();
                     for q in found.as_quats() {
@@ -427,10 +406,7 @@ fn end_velocities_that_cannot_be_met_are_refused() {
             end: glam::DVec3::ZERO,
         };
         for method in METHODS {
-            let interpolation = Interpolation {
-                ends,
-                ..method.into()
-            };
+            let interpolation = Interpolation::from(method).with_ends(ends);
             let error = engine.upload(&set, interpolation).unwrap_err();
             assert!(error.to_string().contains("end velocity"), "{error}");
         }

@@ -7,6 +7,7 @@
 
 mod accuracy;
 mod bit_identity;
+mod buffers;
 mod c2;
 #[cfg(feature = "vulkan")]
 mod crowd;
@@ -26,6 +27,8 @@ mod motion;
 mod names;
 mod numbers;
 mod original;
+#[cfg(feature = "vulkan")]
+mod other_kernels;
 mod outside;
 mod per_track;
 mod poses;

@@ -72,10 +72,7 @@ fn twenty_million_hostile_rotations_have_the_same_bits() {
         let rate = random.pick(&["24", "25", "30000/1001", "60", "120", "1000/3"]);
         let frames = SampleTimes::rate(rate.parse().unwrap()).between(-1.0, 20.0);
         for (i, method) in METHODS.into_iter().enumerate() {
-            let interpolation = Interpolation {
-                ends: random.pick(&ENDS),
-                ..Interpolation::from(method)
-            };
+            let interpolation = Interpolation::from(method).with_ends(random.pick(&ENDS));
             let expected = cpu.evaluate(&set, interpolation, &frames).unwrap();
             for vulkan in round_robin(&engines, seed as usize + i) {
                 let found = vulkan.evaluate(&set, interpolation, &frames).unwrap();
@@ -248,10 +245,7 @@ fn streaming_stores_have_the_bits_of_others() {
             (method::BESSEL_OVERHAUSER, WrapMode::Loop),
             (method::SQUAD, WrapMode::Hold),
         ] {
-            let interpolation = Interpolation {
-                after,
-                ..method.into()
-            };
+            let interpolation = Interpolation::from(method).with_after(after);
             let clip = streaming.upload(&set, interpolation).unwrap();
             let times = (0..700).map(|k| f64::from(k * 617 % 700) * 0.04 - 2.0);
             for frames in [
@@ -379,10 +373,7 @@ fn the_path_as_authored_has_the_same_bits() {
     let frames = SampleTimes::fps(60);
     let engines = vulkan_engines(|_| {});
     for (round, method) in METHODS.into_iter().enumerate() {
-        let interpolation = Interpolation {
-            signs: KeySigns::AsAuthored,
-            ..Interpolation::from(method)
-        };
+        let interpolation = Interpolation::from(method).with_signs(KeySigns::AsAuthored);
         let expected = cpu().evaluate(&set, interpolation, &frames).unwrap();
         for vulkan in round_robin(&engines, round + 1) {
             let found = vulkan.evaluate(&set, interpolation, &frames).unwrap();
@@ -406,10 +397,7 @@ fn closed_loops_have_the_same_bits() {
     let frames = SampleTimes::fps(120);
     let engines = vulkan_engines(|_| {});
     for (round, method) in METHODS.into_iter().enumerate() {
-        let interpolation = Interpolation {
-            ends: Ends::Loop,
-            ..Interpolation::from(method)
-        };
+        let interpolation = Interpolation::from(method).with_ends(Ends::Loop);
         let expected = cpu().evaluate(&set, interpolation, &frames).unwrap();
         for vulkan in round_robin(&engines, round + 2) {
             let found = vulkan.evaluate(&set, interpolation, &frames).unwrap();
@@ -599,10 +587,7 @@ fn few_samples_of_many_keys_have_the_same_bits() {
     let pairs = METHODS.into_iter().enumerate();
     let pairs = pairs.flat_map(|(m, method)| [0, 1].map(|p| (m + p, method, paths[p])));
     for (round, method, path) in pairs {
-        let interpolation = Interpolation {
-            signs: path,
-            ..method.into()
-        };
+        let interpolation = Interpolation::from(method).with_signs(path);
         let clip = cpu().upload(&set, interpolation).unwrap();
         for (request, frames) in requests.iter().enumerate() {
             if !is_due(round, request, 2) {
@@ -684,10 +669,7 @@ fn few_samples_of_keys_near_each_other_have_the_same_bits() {
             Ends::Frozen,
             clamped,
         ] {
-            let interpolation = Interpolation {
-                ends,
-                ..method.into()
-            };
+            let interpolation = Interpolation::from(method).with_ends(ends);
             let clip = cpu().upload(&set, interpolation).unwrap();
             for frames in &requests {
                 let expected = clip.evaluate(frames).unwrap();
@@ -741,12 +723,10 @@ fn tracks_have_the_same_bits_whatever_is_beside_them() {
         (method::BESSEL_OVERHAUSER, KeySigns::AsAuthored),
     ] {
         for (ends, after) in ends.into_iter().flat_map(|end| outside.map(|o| (end, o))) {
-            let interpolation = Interpolation {
-                signs: path,
-                ends,
-                after,
-                ..method.into()
-            };
+            let interpolation = Interpolation::from(method)
+                .with_signs(path)
+                .with_ends(ends)
+                .with_after(after);
             let evaluate = |set: &TrackSet| {
                 let rotations = cpu().evaluate(set, interpolation, &frames).unwrap();
                 rotations.as_quats().to_vec()
@@ -865,10 +845,7 @@ fn long_tracks_in_stretches_have_the_same_bits() {
     let small = vulkan_engines(|options| options.memory = Some(2 << 20));
     let methods = METHODS.into_iter().zip(ENDS.into_iter().cycle());
     for (round, (method, ends)) in methods.enumerate() {
-        let interpolation = Interpolation {
-            ends,
-            ..method.into()
-        };
+        let interpolation = Interpolation::from(method).with_ends(ends);
         let clip = cpu().upload(&set, interpolation).unwrap();
         for (request, frames) in requests.iter().enumerate() {
             let expected = clip.evaluate(frames).unwrap();
@@ -884,10 +861,7 @@ fn long_tracks_in_stretches_have_the_same_bits() {
     keys[9000] = -keys[8999];
     let mut set = TrackSet::new();
     set.push("", &times, &keys).unwrap();
-    let as_authored = Interpolation {
-        signs: KeySigns::AsAuthored,
-        ..method::CATMULL_ROM.into()
-    };
+    let as_authored = Interpolation::from(method::CATMULL_ROM).with_signs(KeySigns::AsAuthored);
     let refused = cpu().evaluate(&set, as_authored, &requests[0]);
     let words = refused.unwrap_err().to_string();
     assert!(words.contains("keys 8999 and 9000"), "{words}");
@@ -995,10 +969,7 @@ fn crowds_of_two_keys_have_the_same_bits() {
         .into_iter()
         .flat_map(|method| [KeySigns::Shortest, KeySigns::AsAuthored].map(|path| (method, path)))
     {
-        let interpolation = Interpolation {
-            signs: path,
-            ..method.into()
-        };
+        let interpolation = Interpolation::from(method).with_signs(path);
         for frames in &requests {
             let timeline = frames.resolve(set.track_count(), set.time_span()).unwrap();
             let clip = cpu().upload(&set, interpolation).unwrap();
@@ -1129,11 +1100,9 @@ fn few_samples_of_a_kept_clip_have_the_same_bits() {
         (method::STEP, WrapMode::Hold),
     ];
     for (round, (method, outside)) in cases.into_iter().enumerate() {
-        let interpolation = Interpolation {
-            before: outside,
-            after: outside,
-            ..method.into()
-        };
+        let interpolation = Interpolation::from(method)
+            .with_before(outside)
+            .with_after(outside);
         let kept = cpu().upload(&set, interpolation).unwrap();
         let clips: Vec<_> = round_robin(&engines, round)
             .map(|engine| (engine, engine.upload(&set, interpolation).unwrap()))
@@ -1210,10 +1179,8 @@ fn dense_sets_go_piece_by_piece() {
     }
     keys[990 * count as usize + 5] = -keys[990 * count as usize + 4];
     let set = TrackSet::with_shared_times(&times, &keys).unwrap();
-    let as_authored = Interpolation {
-        signs: KeySigns::AsAuthored,
-        ..method::BESSEL_OVERHAUSER.into()
-    };
+    let as_authored =
+        Interpolation::from(method::BESSEL_OVERHAUSER).with_signs(KeySigns::AsAuthored);
     for engine in round_robin(&engines, 2).chain([&cpu()]) {
         let refused = engine.evaluate(&set, as_authored, &frames);
         let words = refused.unwrap_err().to_string();

@@ -38,10 +38,7 @@ fn times(random: &mut Random, keys: usize, ratio: f64) -> Vec<f64> {
 /// radians per second, for the size of rounding.
 fn accelerations(set: &TrackSet, interpolation: Interpolation) -> Vec<[DVec3; 2]> {
     let engine = Engine::new(Device::Cpu).unwrap();
-    let of = Interpolation {
-        quantity: Quantity::Acceleration(Axes::Body),
-        ..interpolation
-    };
+    let of = interpolation.with_quantity(Quantity::Acceleration(Axes::Body));
     let keys = set.track(0).times.to_vec();
     let inner = &keys[1..keys.len() - 1];
     let asked: Vec<f64> = inner
@@ -124,10 +121,7 @@ fn the_acceleration_is_continuous_however_keys_are_spaced() {
             rotations[keys - 1] = rotations[0];
         }
         let set = one(&times(&mut random, keys, ratio), &rotations);
-        let interpolation = Interpolation {
-            ends,
-            ..method::C2.into()
-        };
+        let interpolation = Interpolation::from(method::C2).with_ends(ends);
         assert_eq!(interpolation.warnings(&set), []);
         let jump = jump(&set, interpolation);
         worst = worst.max(jump);
@@ -148,10 +142,7 @@ fn keys_at_which_the_acceleration_jumps_are_named() {
         }
     }
     let set = one(&times(&mut random, 24, 10.0), &rotations);
-    let interpolation = Interpolation {
-        signs: KeySigns::AsAuthored,
-        ..method::C2.into()
-    };
+    let interpolation = Interpolation::from(method::C2).with_signs(KeySigns::AsAuthored);
     let found = interpolation.warnings(&set);
     let [
         InterpolationWarning::AccelerationJumps {
@@ -168,10 +159,7 @@ fn keys_at_which_the_acceleration_jumps_are_named() {
     assert!(jump(&set, interpolation) > 1e-3);
     // The shortest way round is an easy curve, and other methods have nothing to say.
     assert_eq!(Interpolation::from(method::C2).warnings(&set), []);
-    let other = Interpolation {
-        signs: KeySigns::AsAuthored,
-        ..method::BESSEL_OVERHAUSER.into()
-    };
+    let other = Interpolation::from(method::BESSEL_OVERHAUSER).with_signs(KeySigns::AsAuthored);
     assert_eq!(other.warnings(&set), []);
 }
 
@@ -238,10 +226,7 @@ fn long_steps_cost_other_keys_nothing() {
         rotations[index] = -rotations[index];
     }
     let even: Vec<f64> = (0..3000).map(f64::from).collect();
-    let interpolation = Interpolation {
-        signs: KeySigns::AsAuthored,
-        ..method::C2.into()
-    };
+    let interpolation = Interpolation::from(method::C2).with_signs(KeySigns::AsAuthored);
     let found = interpolation.warnings(&one(&even, &rotations));
     let [InterpolationWarning::AccelerationJumps { key, count, .. }] = *found else {
         panic!("{found:?}");

@@ -121,10 +121,7 @@ fn memory_of_another_size_is_refused() {
 #[test]
 fn velocities_are_not_stored_as_rotations() {
     let engine = Engine::new(Device::Cpu).unwrap();
-    let velocity = Interpolation {
-        quantity: Quantity::Velocity(Axes::Body),
-        ..method::SLERP.into()
-    };
+    let velocity = Interpolation::from(method::SLERP).with_quantity(Quantity::Velocity(Axes::Body));
     let set = hostile_set(1, 8);
     let clip = engine.upload(&set, velocity).unwrap();
     let frames = SampleTimes::at(vec![0.0, 0.5, 1.0]);

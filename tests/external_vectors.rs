@@ -29,10 +29,7 @@ fn engine_slerp(path: KeySigns, times: &[f64], keys: &[DQuat], at: &[f64]) -> Ve
     let mut set = TrackSet::new();
     let keys: Vec<Quat> = keys.iter().map(|key| key.as_quat()).collect();
     set.push("", times, &keys).unwrap();
-    let interpolation = Interpolation {
-        signs: path,
-        ..method::SLERP.into()
-    };
+    let interpolation = Interpolation::from(method::SLERP).with_signs(path);
     let engine = Engine::new(Device::Cpu).unwrap();
     let rotations = engine
         .evaluate(&set, interpolation, &SampleTimes::at(at.to_vec()))
@@ -305,10 +302,7 @@ fn magnum_gltf_cubic_spline() {
         assert_near(nlerp(keys[0], keys[1], t), line[i], 1e-5);
     }
     // As authored: their dot product is negative.
-    let raw = Interpolation {
-        signs: KeySigns::AsAuthored,
-        ..method::NLERP.into()
-    };
+    let raw = Interpolation::from(method::NLERP).with_signs(KeySigns::AsAuthored);
     let found = evaluate(&set, raw, &[0.35, 0.8]);
     assert_near(found[0], line[0], 1e-5);
     assert_near(found[1], line[1], 1e-5);
@@ -398,10 +392,7 @@ fn gz_math_squad() {
     let found = squad([b, helper(b, &[a, c]), helper(c, &[b]), c], 0.2);
     assert_near(found, [0.978787, 0.107618, 0.137159, 0.107618], 1e-5);
     let closed = set_of(&[0.0, 1.0, 2.0], &[rpy(0.0), rpy(0.4), rpy(0.0)]);
-    let looped = Interpolation {
-        ends: Ends::Loop,
-        ..method::SQUAD.into()
-    };
+    let looped = Interpolation::from(method::SQUAD).with_ends(Ends::Loop);
     for found in evaluate(&closed, looped, &[0.5, 1.5]) {
         assert_near(found, [0.987225, 0.077057, 0.11624, 0.077057], 1e-5);
     }

@@ -276,30 +276,30 @@ impl Generator {
 
     fn follow(&mut self, set: &TrackSet) -> Follow {
         let axes = ["x", "-x", "y", "-y", "z", "-z", "+z"];
-        Follow {
-            method: self.0.pick(&VectorMethod::ALL),
-            ends: self.ends(),
-            direction: match self.0.next() % 4 {
+        Follow::default()
+            .with_method(self.0.pick(&VectorMethod::ALL))
+            .with_ends(self.ends())
+            .with_direction(match self.0.next() % 4 {
                 0 => Direction::Ahead(self.number()),
                 1 => Direction::Point(self.vector()),
                 2 => Direction::Track(self.index(set)),
                 _ => Direction::Tangent,
-            },
-            frame: self
-                .0
-                .pick(&[PathFrame::Minimal, PathFrame::Fixed, PathFrame::Frenet]),
-            up: self.vector(),
-            twist: self.0.pick(&[Twist::Spread, Twist::Free]),
-            speed: match self.0.next() % 3 {
+            })
+            .with_frame(
+                self.0
+                    .pick(&[PathFrame::Minimal, PathFrame::Fixed, PathFrame::Frenet]),
+            )
+            .with_up(self.vector())
+            .with_twist(self.0.pick(&[Twist::Spread, Twist::Free]))
+            .with_speed(match self.0.next() % 3 {
                 0 => PathSpeed::Eased {
                     start: self.number(),
                     end: self.number(),
                 },
                 1 => PathSpeed::Constant,
                 _ => PathSpeed::Keys,
-            },
-            axes: [0, 1].map(|_| self.0.pick(&axes).parse().unwrap()),
-        }
+            })
+            .with_axes([0, 1].map(|_| self.0.pick(&axes).parse().unwrap()))
     }
 
     fn smoothing(&mut self) -> Smoothing {

@@ -44,7 +44,7 @@ fn expected(curve: &ReferenceCurve, quantity: Quantity, time: f64) -> DVec3 {
     let (body, axes) = match quantity {
         Quantity::Velocity(axes) => (curve.velocity(time), axes),
         Quantity::Acceleration(axes) => (curve.acceleration(time), axes),
-        Quantity::Rotation => unreachable!(),
+        _ => unreachable!(),
     };
     match axes {
         Axes::Body => body,
@@ -102,10 +102,7 @@ fn velocities_and_accelerations_are_those_of_the_reference() {
     for frames in [SampleTimes::fps(30), SampleTimes::at(times)] {
         for method in METHODS {
             for quantity in QUANTITIES {
-                let interpolation = Interpolation {
-                    quantity,
-                    ..method.into()
-                };
+                let interpolation = Interpolation::from(method).with_quantity(quantity);
                 let error = largest_error(&set, interpolation, &frames);
                 println!("{method}, {quantity:?}: {error:e}");
                 assert!(error < RATE_BOUND, "{method}, {quantity:?}: {error:e}");
@@ -129,11 +126,9 @@ fn ends_move_as_they_are_told() {
     };
     for method in METHODS {
         for ends in [Ends::Natural, Ends::Secant, Ends::Frozen, clamped] {
-            let interpolation = Interpolation {
-                quantity: Quantity::Velocity(Axes::Body),
-                ends,
-                ..method.into()
-            };
+            let interpolation = Interpolation::from(method)
+                .with_quantity(Quantity::Velocity(Axes::Body))
+                .with_ends(ends);
             let error = largest_error(&set, interpolation, &SampleTimes::fps(24));
             assert!(error < RATE_BOUND, "{method}, {ends:?}: {error:e}");
         }
@@ -149,10 +144,7 @@ fn the_same_bits_on_every_device() {
         let frames = SampleTimes::fps(30).between(-1.0, 20.0);
         for (i, method) in METHODS.into_iter().enumerate() {
             for (j, quantity) in QUANTITIES.into_iter().enumerate() {
-                let interpolation = Interpolation {
-                    quantity,
-                    ..method.into()
-                };
+                let interpolation = Interpolation::from(method).with_quantity(quantity);
                 let layout = Layout::TrackMajor;
                 let expected = cpu.rates(&set, interpolation, &frames, layout).unwrap();
                 let expected: &[Quat] = bytemuck::cast_slice(expected.as_slice());
@@ -176,10 +168,8 @@ fn a_door_turns_until_its_last_key() {
     set.push("door", &[0.0, 1.0, 2.0], &keys).unwrap();
     set.push("wall", &[0.5], &keys[..1]).unwrap();
     let engine = Engine::new(Device::Cpu).unwrap();
-    let velocity = Interpolation {
-        quantity: Quantity::Velocity(Axes::Parent),
-        ..method::SLERP.into()
-    };
+    let velocity =
+        Interpolation::from(method::SLERP).with_quantity(Quantity::Velocity(Axes::Parent));
     let frames = SampleTimes::fps(2).between(-1.0, 3.0);
     let times = SampleTimes::at((-2..=6).map(|i| f64::from(i) * 0.5).collect());
     for frames in [frames, times] {

@@ -3,14 +3,16 @@
 use std::fmt::{Debug, Display};
 use std::str::FromStr;
 
-use tumble::crowd::CrowdValues;
+use tumble::crowd::{CrowdValues, LayerBlend};
 use tumble::glam::Quat;
-use tumble::paths::{PathFrame, Twist};
+use tumble::paths::{BodyAxis, PathFrame, Twist};
 use tumble::reduce::ReducedCurve;
+use tumble::verify::{DifferenceKind, WordType};
 use tumble::{
-    Axes, Channel, ComponentType, Device, Encoding, Ends, Engine, Error, KeySigns, Layout, METHODS,
-    MatrixOrder, Method, Quantity, SampleTimes, SmoothingEnds, Speed, TrackSet, UnknownNameError,
-    VectorMethod, VectorWidth, WrapMode, method,
+    Axes, Channel, ComponentType, Device, Encoding, Ends, Engine, Error, EulerSequence, FrameRate,
+    KeySigns, Layout, METHODS, MatrixOrder, Method, Quantity, SampleTimes, SmoothingEnds,
+    SmoothingKernel, Speed, TrackSet, UnknownNameError, VectorMethod, VectorWidth, WrapMode,
+    method,
 };
 
 #[track_caller]
@@ -33,8 +35,10 @@ fn values_of_options_are_found_by_their_names() {
     assert_named(&Channel::ALL);
     assert_named(&ComponentType::ALL);
     assert_named(&CrowdValues::ALL);
+    assert_named(&DifferenceKind::ALL);
     assert_named(&Ends::ALL);
     assert_named(&KeySigns::ALL);
+    assert_named(&LayerBlend::ALL);
     assert_named(&Layout::ALL);
     assert_named(&MatrixOrder::ALL);
     assert_named(&PathFrame::ALL);
@@ -45,11 +49,36 @@ fn values_of_options_are_found_by_their_names() {
     assert_named(&Twist::ALL);
     assert_named(&VectorMethod::ALL);
     assert_named(&VectorWidth::ALL);
+    assert_named(&WordType::ALL);
     assert_named(&WrapMode::ALL);
     assert_named::<Method>(&METHODS);
     for encoding in Encoding::ALL {
         let found: Encoding = encoding.name().parse().unwrap();
         assert_eq!(found.name(), encoding.name());
+    }
+}
+
+/// A text that is no value is named by the message, whatever type it was parsed as.
+#[test]
+fn messages_say_what_was_parsed() {
+    fn message<T: FromStr<Err: Display>>(text: &str) -> String {
+        text.parse::<T>()
+            .map_or_else(|error| error.to_string(), |_| String::new())
+    }
+    for message in [
+        message::<BodyAxis>,
+        message::<Encoding>,
+        message::<EulerSequence>,
+        message::<FrameRate>,
+        message::<LayerBlend>,
+        message::<Method>,
+        message::<Quantity>,
+        message::<SmoothingKernel>,
+        message::<VectorWidth>,
+        message::<WordType>,
+    ] {
+        let found = message("sideways");
+        assert!(found.contains("`sideways`"), "{found}");
     }
 }
 

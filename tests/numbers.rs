@@ -65,10 +65,7 @@ fn evaluated(set: &TrackSet, interpolation: Interpolation) -> Computed {
 fn with_tcb(tcb: Tcb) -> Computed {
     let mut all = Vec::new();
     for method in METHODS {
-        let interpolation = Interpolation {
-            tcb,
-            ..method.into()
-        };
+        let interpolation = Interpolation::from(method).with_tcb(tcb);
         all.extend(evaluated(&set(), interpolation)?);
     }
     Ok(all)
@@ -77,10 +74,7 @@ fn with_tcb(tcb: Tcb) -> Computed {
 fn with_ends(start: DVec3, end: DVec3) -> Computed {
     let mut all = Vec::new();
     for method in METHODS {
-        let interpolation = Interpolation {
-            ends: Ends::Clamped { start, end },
-            ..method.into()
-        };
+        let interpolation = Interpolation::from(method).with_ends(Ends::Clamped { start, end });
         all.extend(evaluated(&set(), interpolation)?);
     }
     Ok(all)
@@ -279,44 +273,30 @@ const NUMBERS: &[Number] = &[
     Number {
         name: "Follow.up",
         word: "upward",
-        try_with: |value| {
-            followed(&Follow {
-                up: DVec3::new(0.0, value, 0.0),
-                ..Follow::default()
-            })
-        },
+        try_with: |value| followed(&Follow::default().with_up(DVec3::new(0.0, value, 0.0))),
     },
     Number {
         name: "Direction::Ahead",
         word: "ahead",
-        try_with: |value| {
-            followed(&Follow {
-                direction: Direction::Ahead(value),
-                ..Follow::default()
-            })
-        },
+        try_with: |value| followed(&Follow::default().with_direction(Direction::Ahead(value))),
     },
     Number {
         name: "Direction::Point",
         word: "look at",
         try_with: |value| {
-            followed(&Follow {
-                direction: Direction::Point(DVec3::new(1.0, value, 0.0)),
-                ..Follow::default()
-            })
+            followed(
+                &Follow::default().with_direction(Direction::Point(DVec3::new(1.0, value, 0.0))),
+            )
         },
     },
     Number {
         name: "PathSpeed::Eased.start",
         word: "grow",
         try_with: |value| {
-            followed(&Follow {
-                speed: PathSpeed::Eased {
-                    start: value,
-                    end: 0.2,
-                },
-                ..Follow::default()
-            })
+            followed(&Follow::default().with_speed(PathSpeed::Eased {
+                start: value,
+                end: 0.2,
+            }))
         },
     },
     Number {
@@ -381,13 +361,7 @@ const NUMBERS: &[Number] = &[
         word: "weight",
         try_with: |value| {
             let weight = value as f32;
-            crowded(
-                1,
-                CrowdLayer {
-                    weight,
-                    ..CrowdLayer::new(0)
-                },
-            )
+            crowded(1, CrowdLayer::new(0).with_weight(weight))
         },
     },
     Number {
@@ -395,13 +369,7 @@ const NUMBERS: &[Number] = &[
         word: "speed",
         try_with: |value| {
             let speed = value as f32;
-            crowded(
-                0,
-                CrowdLayer {
-                    speed,
-                    ..CrowdLayer::new(0)
-                },
-            )
+            crowded(0, CrowdLayer::new(0).with_speed(speed))
         },
     },
     Number {
@@ -496,10 +464,7 @@ fn errors_name_the_option_and_the_value() {
         bias: f64::NAN,
         ..Tcb::default()
     };
-    let interpolation = Interpolation {
-        tcb,
-        ..method::KOCHANEK_BARTELS.into()
-    };
+    let interpolation = Interpolation::from(method::KOCHANEK_BARTELS).with_tcb(tcb);
     let error = interpolation.check().unwrap_err();
     assert_eq!(
         error.to_string(),
@@ -522,10 +487,7 @@ fn errors_name_the_option_and_the_value() {
         error,
         Error::Pose(PoseError::WeightNotFinite { layer: 1, .. })
     ));
-    let smoothing = Smoothing {
-        passes: u32::MAX,
-        ..Smoothing::new(SmoothingKernel::Linear)
-    };
+    let smoothing = Smoothing::new(SmoothingKernel::Linear).with_passes(u32::MAX);
     assert_eq!(
         smoothing.check().unwrap_err().to_string(),
         "4294967295 passes are too many; give at most 10000, or a wider kernel"

@@ -101,10 +101,7 @@ fn assert_matches_the_original(set: &TrackSet, label: &str) {
         .filter(|method| ["slerp", "catmull-rom", "bessel-overhauser"].contains(&method.name))
     {
         // The original takes keys as they are.
-        let interpolation = Interpolation {
-            signs: KeySigns::AsAuthored,
-            ..method.into()
-        };
+        let interpolation = Interpolation::from(method).with_signs(KeySigns::AsAuthored);
         let rotations = engine
             .evaluate(set, interpolation, &SampleTimes::fps(25))
             .unwrap();

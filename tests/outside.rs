@@ -67,6 +67,7 @@ fn expected(curve: &ReferenceCurve, track: Track, sides: [WrapMode; 2], time: f6
             let velocity: DVec3 = curve.velocity(end);
             curve.rotation(end) * DQuat::from_scaled_axis(velocity * (time - end))
         }
+        other => panic!("the formula of {other} is missing"),
     }
 }
 
@@ -79,11 +80,9 @@ fn outside_is_what_the_words_say() {
     for method in METHODS {
         for before in ALL {
             for after in ALL {
-                let interpolation = Interpolation {
-                    before,
-                    after,
-                    ..method.into()
-                };
+                let interpolation = Interpolation::from(method)
+                    .with_before(before)
+                    .with_after(after);
                 for frames in [
                     SampleTimes::fps(24).between(-12.0, 14.0),
                     SampleTimes::at(times.clone()),
@@ -154,11 +153,9 @@ fn the_same_bits_on_every_device_however_it_is_cut() {
                 [WrapMode::Extrapolate, WrapMode::Loop],
                 [WrapMode::Hold, WrapMode::Extrapolate],
             ] {
-                let interpolation = Interpolation {
-                    before,
-                    after,
-                    ..method.into()
-                };
+                let interpolation = Interpolation::from(method)
+                    .with_before(before)
+                    .with_after(after);
                 let expected = cpu.evaluate(&long, interpolation, &frames).unwrap();
                 let mut streamed = Vec::new();
                 let layout = Layout::TrackMajor;
@@ -199,12 +196,10 @@ fn two_keys_go_on_turning() {
     let engine = Engine::new(Device::Cpu).unwrap();
     let at = [-1.0, 5.0, 12.0];
     for quantity in [Quantity::Rotation, Quantity::Velocity(Axes::Body)] {
-        let interpolation = Interpolation {
-            before: WrapMode::Extrapolate,
-            after: WrapMode::Extrapolate,
-            quantity,
-            ..method::C2.into()
-        };
+        let interpolation = Interpolation::from(method::C2)
+            .with_before(WrapMode::Extrapolate)
+            .with_after(WrapMode::Extrapolate)
+            .with_quantity(quantity);
         let frames = SampleTimes::at(at.to_vec());
         let mut found = [[0.0; 4]; 3];
         let layout = Layout::TrackMajor;
@@ -222,11 +217,9 @@ fn two_keys_go_on_turning() {
             assert!(off < 3e-7, "{quantity:?} at {time}: {off:e}");
         }
     }
-    let mirrored = Interpolation {
-        after: WrapMode::Mirror,
-        quantity: Quantity::Velocity(Axes::Body),
-        ..method::C2.into()
-    };
+    let mirrored = Interpolation::from(method::C2)
+        .with_after(WrapMode::Mirror)
+        .with_quantity(Quantity::Velocity(Axes::Body));
     let refused = engine
         .rates(&set, mirrored, &SampleTimes::fps(1), Layout::TrackMajor)
         .unwrap_err();
@@ -245,11 +238,9 @@ fn times_beyond_counting_give_rotations() {
     let engine = Engine::new(Device::Cpu).unwrap();
     for method in METHODS {
         for outside in ALL {
-            let interpolation = Interpolation {
-                before: outside,
-                after: outside,
-                ..method.into()
-            };
+            let interpolation = Interpolation::from(method)
+                .with_before(outside)
+                .with_after(outside);
             let frames = SampleTimes::at(times.clone());
             let rotations = engine.evaluate(&set, interpolation, &frames).unwrap();
             for q in rotations.as_quats() {
@@ -275,10 +266,8 @@ fn wild_turns_as_authored_give_rotations() {
     set.push("", &times, &keys).unwrap();
     let engine = Engine::new(Device::Cpu).unwrap();
     for method in METHODS {
-        let interpolation = Interpolation {
-            signs: method.signs.unwrap_or(tumble::KeySigns::AsAuthored),
-            ..method.into()
-        };
+        let interpolation = Interpolation::from(method)
+            .with_signs(method.signs.unwrap_or(tumble::KeySigns::AsAuthored));
         let rotations = engine
             .evaluate(&set, interpolation, &SampleTimes::fps(100))
             .unwrap();

@@ -24,16 +24,12 @@ fn engines() -> Vec<Engine> {
 
 /// Five interpolations in turn, so that the tracks of each lie between others.
 fn alternating(tracks: usize) -> Vec<Interpolation> {
-    let looped = Interpolation {
-        before: WrapMode::Loop,
-        after: WrapMode::Mirror,
-        ..method::SQUAD.into()
-    };
-    let extrapolated = Interpolation {
-        after: WrapMode::Extrapolate,
-        speed: Speed::AsKeyed,
-        ..method::BESSEL_OVERHAUSER.into()
-    };
+    let looped = Interpolation::from(method::SQUAD)
+        .with_before(WrapMode::Loop)
+        .with_after(WrapMode::Mirror);
+    let extrapolated = Interpolation::from(method::BESSEL_OVERHAUSER)
+        .with_after(WrapMode::Extrapolate)
+        .with_speed(Speed::AsKeyed);
     let different = [
         method::SLERP.into(),
         looped,
@@ -172,9 +168,8 @@ fn equal_interpolations_are_one() {
 #[test]
 fn rates_have_a_quantity_for_all_tracks() {
     let set = hostile_set(9, 6);
-    let velocity = |method: tumble::Method| Interpolation {
-        quantity: Quantity::Velocity(Axes::Body),
-        ..method.into()
+    let velocity = |method: tumble::Method| {
+        Interpolation::from(method).with_quantity(Quantity::Velocity(Axes::Body))
     };
     let methods = [method::SLERP, method::SQUAD];
     let methods = methods.into_iter().cycle().take(set.track_count());
@@ -242,10 +237,7 @@ fn errors_name_the_track_of_the_whole_set() {
     ] {
         set.push("", &[0.0, 1.0], &keys).unwrap();
     }
-    let as_authored = Interpolation {
-        signs: KeySigns::AsAuthored,
-        ..method::SLERP.into()
-    };
+    let as_authored = Interpolation::from(method::SLERP).with_signs(KeySigns::AsAuthored);
     let each = vec![as_authored, method::STEP.into(), as_authored];
     let engine = Engine::new(Device::Cpu).unwrap();
     let frames = SampleTimes::fps(30).between(0.0, 3.0);
@@ -277,10 +269,7 @@ fn vectors_have_a_method_for_each_track() {
     }
     let methods = [VectorMethod::Step, VectorMethod::C2, VectorMethod::Linear];
     let methods: Vec<_> = methods.into_iter().cycle().take(tracks).collect();
-    let frozen = Interpolation {
-        ends: Ends::Frozen,
-        ..method::SLERP.into()
-    };
+    let frozen = Interpolation::from(method::SLERP).with_ends(Ends::Frozen);
     let mut each: Vec<Interpolation> = vec![method::SLERP.into(); tracks];
     each[4] = frozen;
     let frames = SampleTimes::fps(24).between(0.0, 3.0);

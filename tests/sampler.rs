@@ -70,19 +70,14 @@ fn samples_have_the_bits_of_evaluate() {
     let times = times(&set, &mut random);
     for (index, method) in METHODS.into_iter().enumerate() {
         for (before, after) in WrapMode::ALL.into_iter().enumerate() {
-            let interpolation = Interpolation {
-                before: WrapMode::ALL[(index + before) % 4],
-                after,
-                ..method.into()
-            };
+            let interpolation = Interpolation::from(method)
+                .with_before(WrapMode::ALL[(index + before) % 4])
+                .with_after(after);
             let clip = cpu().upload(&set, interpolation).unwrap();
             assert_sampled(&clip, &times, &format!("{method}, {before}, {after}"));
         }
     }
-    let constant = Interpolation {
-        speed: Speed::Constant,
-        ..method::C2.into()
-    };
+    let constant = Interpolation::from(method::C2).with_speed(Speed::Constant);
     let clip = cpu().upload(&set, constant).unwrap();
     assert_sampled(&clip, &times, "constant speed");
 }
@@ -97,10 +92,7 @@ fn arcs_of_any_length_have_the_bits_of_evaluate() {
         let times: Vec<f64> = (0..9).map(f64::from).collect();
         set.push("", &times, &keys).unwrap();
     }
-    let authored = Interpolation {
-        signs: KeySigns::AsAuthored,
-        ..method::SLERP.into()
-    };
+    let authored = Interpolation::from(method::SLERP).with_signs(KeySigns::AsAuthored);
     let clip = cpu().upload(&set, authored).unwrap();
     assert_sampled(&clip, &times(&set, &mut random), "as authored");
 }
@@ -135,10 +127,7 @@ fn long_tracks_have_the_bits_of_evaluate() {
         (method::BESSEL_OVERHAUSER, WrapMode::Mirror),
         (method::STEP, WrapMode::Loop),
     ] {
-        let interpolation = Interpolation {
-            after,
-            ..method.into()
-        };
+        let interpolation = Interpolation::from(method).with_after(after);
         let clip = cpu().upload(&set, interpolation).unwrap();
         assert_sampled(&clip, &sampled, &format!("{method}, {after}"));
     }
@@ -147,10 +136,7 @@ fn long_tracks_have_the_bits_of_evaluate() {
 #[test]
 fn an_interpolation_for_each_track_is_sampled() {
     let set = hostile_set(5, 12);
-    let looped = Interpolation {
-        after: WrapMode::Loop,
-        ..method::SQUAD.into()
-    };
+    let looped = Interpolation::from(method::SQUAD).with_after(WrapMode::Loop);
     let each = [looped, method::SLERP.into(), method::C2.into()];
     let each: Vec<Interpolation> = each.into_iter().cycle().take(12).collect();
     let clip = cpu().upload(&set, each).unwrap();
@@ -235,10 +221,7 @@ fn kept_keys_have_the_bits_of_segments() {
     let mut sampled = times(&set, &mut Random(22));
     sampled.extend((0..1000).map(|frame| f64::from(frame) / 173.0));
     let (of_segments, of_keys) = (keeping(u64::MAX, None), keeping(0, None));
-    let natural = Interpolation {
-        ends: Ends::Natural,
-        ..method::CATMULL_ROM.into()
-    };
+    let natural = Interpolation::from(method::CATMULL_ROM).with_ends(Ends::Natural);
     let interpolations: [Interpolation; 4] = [
         method::SLERP.into(),
         method::BESSEL_OVERHAUSER.into(),
@@ -308,10 +291,8 @@ fn kept_keys_keep_a_budget() {
 #[test]
 fn velocities_are_sampled_as_vectors() {
     let set = hostile_set(11, 9);
-    let velocity = Interpolation {
-        quantity: Quantity::Velocity(Axes::Body),
-        ..method::BESSEL_OVERHAUSER.into()
-    };
+    let velocity = Interpolation::from(method::BESSEL_OVERHAUSER)
+        .with_quantity(Quantity::Velocity(Axes::Body));
     let clip = cpu().upload(&set, velocity).unwrap();
     let times = times(&set, &mut Random(10));
     let frames = SampleTimes::at(times.clone());

@@ -72,6 +72,7 @@ fn expected(curve: &VectorCurve, quantity: ScalarQuantity, time: f64) -> f64 {
         ScalarQuantity::Value => curve.value(time).x,
         ScalarQuantity::Velocity => curve.derivatives(time)[0].x,
         ScalarQuantity::Acceleration => curve.derivatives(time)[1].x,
+        other => panic!("the formula of {other} is missing"),
     }
 }
 
@@ -81,10 +82,7 @@ fn scalars_and_their_rates_are_the_textbook_s() {
     let Case { set, curves } = case(1, 40);
     for how in VectorMethod::ALL {
         for ends in [Ends::Parabolic, Ends::Natural, Ends::Secant, Ends::Frozen] {
-            let interpolation = Interpolation {
-                ends,
-                ..method::SLERP.into()
-            };
+            let interpolation = Interpolation::from(method::SLERP).with_ends(ends);
             for frames in [
                 SampleTimes::fps(24),
                 SampleTimes::at((-20..260).map(|i| 0.05 * f64::from(i)).collect()),
@@ -135,11 +133,9 @@ fn scalars_have_the_same_bits_on_every_device() {
     for engine in vulkan_engines(|_| ()) {
         for (i, how) in VectorMethod::ALL.into_iter().enumerate() {
             for (j, quantity) in ScalarQuantity::ALL.into_iter().enumerate() {
-                let interpolation = Interpolation {
-                    before: modes[(i + j) % modes.len()],
-                    after: modes[(i + 2 * j + 1) % modes.len()],
-                    ..method::SLERP.into()
-                };
+                let interpolation = Interpolation::from(method::SLERP)
+                    .with_before(modes[(i + j) % modes.len()])
+                    .with_after(modes[(i + 2 * j + 1) % modes.len()]);
                 let frames = SampleTimes::fps(97).between(-20.0, 30.0);
                 let [a, b] = [&cpu, &engine].map(|engine| {
                     let found = evaluate(engine, &set, quantity, how, interpolation, &frames);
@@ -211,11 +207,9 @@ fn rates_in_copies_are_those_of_the_track() {
         .unwrap();
     let how = VectorMethod::BesselOverhauser;
     let of = |wrap: WrapMode, quantity, times: &[f64]| {
-        let interpolation = Interpolation {
-            before: wrap,
-            after: wrap,
-            ..method::SLERP.into()
-        };
+        let interpolation = Interpolation::from(method::SLERP)
+            .with_before(wrap)
+            .with_after(wrap);
         let frames = SampleTimes::at(times.to_vec());
         let found = evaluate(&engine, &set, quantity, how, interpolation, &frames);
         let layout = Layout::TrackMajor;
@@ -251,11 +245,9 @@ fn rates_in_copies_are_those_of_the_track() {
         [0.0; 2]
     );
     // Frames of a rate whose copies do not begin on them.
-    let interpolation = Interpolation {
-        before: WrapMode::Mirror,
-        after: WrapMode::Mirror,
-        ..method::SLERP.into()
-    };
+    let interpolation = Interpolation::from(method::SLERP)
+        .with_before(WrapMode::Mirror)
+        .with_after(WrapMode::Mirror);
     let frames = SampleTimes::fps(30).between(-2.0, 3.0);
     let found = evaluate(&engine, &set, velocity, how, interpolation, &frames);
     let values = evaluate(
@@ -339,21 +331,16 @@ fn velocities_of_loops_have_no_holes() {
         ];
         set.push("", &[0.1, 0.1 + last], &keys).unwrap();
         for rate in [10, 20, 30, 50] {
-            let interpolation = Interpolation {
-                before: WrapMode::Loop,
-                after: WrapMode::Loop,
-                ..method::SLERP.into()
-            };
+            let interpolation = Interpolation::from(method::SLERP)
+                .with_before(WrapMode::Loop)
+                .with_after(WrapMode::Loop);
             let frames = SampleTimes::fps(rate).between(-30.0, 30.0);
             let linear = VectorMethod::Linear;
             let velocity = ScalarQuantity::Velocity;
             let found = evaluate(&engine, &set, velocity, linear, interpolation, &frames);
             let is_one = |x: &f32| (x - 1.0).abs() < 1e-6;
             assert!(found.as_slice().iter().all(is_one), "{steps} {rate}");
-            let interpolation = Interpolation {
-                quantity,
-                ..interpolation
-            };
+            let interpolation = interpolation.with_quantity(quantity);
             let found = engine
                 .rates(&set, interpolation, &frames, Layout::TrackMajor)
                 .unwrap();

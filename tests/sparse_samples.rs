@@ -91,12 +91,10 @@ fn few_samples_have_the_bits_of_many() {
         let each = QUANTITIES.into_iter();
         each.flat_map(move |quantity| wraps.map(|wrap| (*method, quantity, wrap)))
     }) {
-        let interpolation = Interpolation {
-            quantity,
-            before: wrap,
-            after: wrap,
-            ..Interpolation::from(method)
-        };
+        let interpolation = Interpolation::from(method)
+            .with_quantity(quantity)
+            .with_before(wrap)
+            .with_after(wrap);
         let is_refused = engine.upload(&set, interpolation).is_err();
         if is_refused {
             continue;
@@ -166,10 +164,7 @@ fn few_frames_have_the_bits_of_many() {
         method::C2,
     ] {
         for quantity in QUANTITIES {
-            let interpolation = Interpolation {
-                quantity,
-                ..Interpolation::from(method)
-            };
+            let interpolation = Interpolation::from(method).with_quantity(quantity);
             // A clip has all its segments.
             let clip = engine.upload(&set, interpolation).unwrap();
             for frames in [
@@ -225,11 +220,9 @@ fn few_vectors_and_encodings_have_the_bits_of_many() {
         VectorMethod::Step,
     ] {
         for wrap in [WrapMode::Hold, WrapMode::Loop, WrapMode::Extrapolate] {
-            let how = Interpolation {
-                before: wrap,
-                after: wrap,
-                ..Interpolation::from(method::SLERP)
-            };
+            let how = Interpolation::from(method::SLERP)
+                .with_before(wrap)
+                .with_after(wrap);
             let of = |times: &[f64]| {
                 let frames = SampleTimes::at(times.to_vec());
                 let (channel, layout) = (Channel::Translation, Layout::TrackMajor);

@@ -29,10 +29,7 @@ fn set() -> TrackSet {
 }
 
 fn constant(method: tumble::Method) -> Interpolation {
-    Interpolation {
-        speed: Speed::Constant,
-        ..method.into()
-    }
+    Interpolation::from(method).with_speed(Speed::Constant)
 }
 
 #[test]
@@ -106,12 +103,10 @@ fn velocities_have_one_length_and_go_on() {
         Quantity::Acceleration(Axes::Parent),
     ] {
         for method in [method::BESSEL_OVERHAUSER, method::B_SPLINE, method::SLERP] {
-            let interpolation = Interpolation {
-                quantity,
-                after: WrapMode::Extrapolate,
-                ends: Ends::Parabolic,
-                ..constant(method)
-            };
+            let interpolation = constant(method)
+                .with_quantity(quantity)
+                .with_after(WrapMode::Extrapolate)
+                .with_ends(Ends::Parabolic);
             let layout = tumble::Layout::TrackMajor;
             let found = engine.rates(&set, interpolation, &frames, layout).unwrap();
             for (t, track) in set.tracks().enumerate() {

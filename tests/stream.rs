@@ -150,10 +150,7 @@ fn parts_are_those_of_the_whole() {
             (WrapMode::Mirror, Encoding::F32),
             (WrapMode::Loop, Encoding::Euler(sequence)),
         ] {
-            let interpolation = Interpolation {
-                after: wrap,
-                ..method::BESSEL_OVERHAUSER.into()
-            };
+            let interpolation = Interpolation::from(method::BESSEL_OVERHAUSER).with_after(wrap);
             let clip = engine.upload(&set, interpolation).unwrap();
             for frames in &requests {
                 let samples = clip.timeline(frames).unwrap().len();

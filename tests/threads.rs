@@ -123,10 +123,7 @@ fn calls(engine: &Engine) -> Vec<Call> {
     let chain: &'static _ = Box::leak(Box::new(Skeleton::chain(tracks, 0.5).unwrap()));
     let poses = engine.evaluate(set, method::SLERP, &frames(50)).unwrap();
     let poses: &'static _ = Box::leak(Box::new(poses));
-    let velocity = Interpolation {
-        quantity: Quantity::Velocity(Axes::Body),
-        ..method::SLERP.into()
-    };
+    let velocity = Interpolation::from(method::SLERP).with_quantity(Quantity::Velocity(Axes::Body));
     let mut library = CrowdLibrary::new(chain).unwrap();
     let moves = library.push(set, method::SLERP, VectorMethod::Linear);
     moves.unwrap();
@@ -317,11 +314,7 @@ fn to_application_buffers() {
     let expected = clip.evaluate(&SampleTimes::fps(40)).unwrap();
     let size = size_of_val(expected.as_quats()) as u64;
     let buffers: Vec<_> = (0..60).map(|_| application.buffer(size)).collect();
-    let whole = |buffer| VulkanBuffer {
-        buffer,
-        offset: 0,
-        size,
-    };
+    let whole = |buffer| VulkanBuffer::new(buffer, size);
     buffers.par_iter().for_each(|&(buffer, _)| {
         let frames = SampleTimes::fps(40);
         // SAFETY: each buffer is the device's, has memory, and is this task's alone.

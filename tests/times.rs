@@ -88,11 +88,9 @@ fn check_written(seed: u64, engines: &[Engine]) {
     let mut random = Random(seed);
     let set = any_set(&mut random);
     let frames = any_frames(&mut random, &set);
-    let interpolation = Interpolation {
-        before: random.pick(&MODES),
-        after: random.pick(&MODES),
-        ..random.pick(&METHODS).into()
-    };
+    let interpolation = Interpolation::from(random.pick(&METHODS))
+        .with_before(random.pick(&MODES))
+        .with_after(random.pick(&MODES));
     let layout = random.pick(&[Layout::TrackMajor, Layout::FrameMajor]);
     let span = set.time_span();
     let count = frames.resolve(set.track_count(), span).unwrap().len() * set.track_count();
@@ -194,11 +192,9 @@ fn accuracy_is_the_same_at_every_time() {
                 .enumerate()
             {
                 let after = MODES[(r + w) % 3];
-                let interpolation = Interpolation {
-                    after,
-                    before: after,
-                    ..method.into()
-                };
+                let interpolation = Interpolation::from(method)
+                    .with_after(after)
+                    .with_before(after);
                 // From before the keys until behind them.
                 let start = base - 0.75 + 1.0 / 4096.0;
                 let sampled = SampleTimes::rate(rate).between(start, start + 2.0);
@@ -267,10 +263,7 @@ fn curves_of_raw_unix_times_are_as_accurate_as_at_zero() {
         for (method, speed) in as_keyed.into_iter().chain(paced) {
             let mut track = set.track(0);
             track.times = &from_first;
-            let interpolation = Interpolation {
-                speed,
-                ..method.into()
-            };
+            let interpolation = Interpolation::from(method).with_speed(speed);
             let curve = ReferenceCurve::of(&interpolation, track);
             let found = engine.evaluate(&set, interpolation, &SampleTimes::at(samples.clone()));
             let each = if speed == Speed::Constant { 7 } else { 1 };
@@ -298,11 +291,9 @@ fn repeated_motion_is_as_accurate_far_out() {
     let unit = |seconds: f64| (seconds * UNIT) as i128 * 1001;
     let length = unit(times[39]);
     for mode in [WrapMode::Loop, WrapMode::Mirror] {
-        let interpolation = Interpolation {
-            before: mode,
-            after: mode,
-            ..method::BESSEL_OVERHAUSER.into()
-        };
+        let interpolation = Interpolation::from(method::BESSEL_OVERHAUSER)
+            .with_before(mode)
+            .with_after(mode);
         for start in [10.0, 1e6 + 0.5, 1.7e9, -1.7e9, 1e12, -1e12] {
             let frames =
                 SampleTimes::rate(FrameRate::new(1001, 2).unwrap()).between(start, start + 1.0);
@@ -385,11 +376,9 @@ fn far_extrapolation_is_finite() {
     let engine = Engine::new(Device::Cpu).unwrap();
     for before in MODES {
         for after in MODES {
-            let interpolation = Interpolation {
-                before,
-                after,
-                ..method::BESSEL_OVERHAUSER.into()
-            };
+            let interpolation = Interpolation::from(method::BESSEL_OVERHAUSER)
+                .with_before(before)
+                .with_after(after);
             for start in [1.7e9, -4e16, 4e16, 1e18, -1e18] {
                 let frames = SampleTimes::fps(1000).between(start, start + 2.0);
                 let mut output = vec![POISON; frames.resolve(1, None).unwrap().len()];
@@ -483,11 +472,9 @@ fn the_unit_of_time_changes_no_bits() {
         .iter()
         .flat_map(|&method| [WrapMode::Hold, WrapMode::Loop].map(|wrap| (method, wrap)))
         .flat_map(|(method, wrap)| {
-            let interpolation = Interpolation {
-                before: wrap,
-                after: wrap,
-                ..method.into()
-            };
+            let interpolation = Interpolation::from(method)
+                .with_before(wrap)
+                .with_after(wrap);
             let expected = evaluated(&engine, 1.0, interpolation);
             let is_other = |unit: &f64| evaluated(&engine, *unit, interpolation) != expected;
             let found: Vec<f64> = units.into_iter().filter(is_other).collect();

@@ -85,10 +85,7 @@ fn translations_are_the_textbook_s() {
     let Case { set, curves } = case(1);
     for vectors in VectorMethod::ALL {
         for ends in ENDS {
-            let interpolation = Interpolation {
-                ends,
-                ..method::SLERP.into()
-            };
+            let interpolation = Interpolation::from(method::SLERP).with_ends(ends);
             for frames in [
                 SampleTimes::fps(24),
                 SampleTimes::at((0..200).map(|i| 0.05 * f64::from(i)).collect()),
@@ -144,11 +141,9 @@ fn the_same_bits_on_every_device() {
     let frames = SampleTimes::fps(12).between(-5.0, 20.0);
     for (i, vectors) in VectorMethod::ALL.into_iter().enumerate() {
         for (j, (before, after)) in sides.into_iter().zip(sides.into_iter().rev()).enumerate() {
-            let interpolation = Interpolation {
-                before,
-                after,
-                ..method::BESSEL_OVERHAUSER.into()
-            };
+            let interpolation = Interpolation::from(method::BESSEL_OVERHAUSER)
+                .with_before(before)
+                .with_after(after);
             for layout in [Layout::TrackMajor, Layout::FrameMajor] {
                 let of = |engine: &Engine| {
                     let found = engine.transforms(&set, interpolation, vectors, &frames, layout);
@@ -174,11 +169,9 @@ fn a_lift_goes_on_rising() {
     set.set_translations(0, &[0.0, 1.0], &keys, &[]).unwrap();
     set.set_scales(0, &[0.5], &[Vec3::splat(3.0)], &[]).unwrap();
     let engine = Engine::new(Device::Cpu).unwrap();
-    let rising = Interpolation {
-        before: WrapMode::Extrapolate,
-        after: WrapMode::Extrapolate,
-        ..method::SLERP.into()
-    };
+    let rising = Interpolation::from(method::SLERP)
+        .with_before(WrapMode::Extrapolate)
+        .with_after(WrapMode::Extrapolate);
     let frames = SampleTimes::fps(1).between(-2.0, 3.0);
     let linear = VectorMethod::Linear;
     let found = engine

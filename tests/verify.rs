@@ -136,10 +136,7 @@ fn rates_between_uneven_keys_are_within_their_bounds() {
     set.push("near", &[0.0, 0.5, 0.501, 1.0], &angles).unwrap();
     for method in METHODS {
         for ends in [method.ends, Ends::Natural] {
-            let interpolation = Interpolation {
-                ends,
-                ..method.into()
-            };
+            let interpolation = Interpolation::from(method).with_ends(ends);
             let found = verify(&engine, &set, interpolation, &SampleTimes::fps(25)).unwrap();
             assert_eq!(found.verdict(), Verdict::ReferenceOnly, "{found:?}");
         }

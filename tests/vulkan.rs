@@ -114,7 +114,7 @@ fn the_comparison_finds_a_driver_that_is_left_free() {
 /// Core and synchronization checks over everything an evaluation does.
 #[test]
 fn the_validation_layer_has_nothing_to_say() {
-    let devices = match Device::list_with(true) {
+    let devices = match Device::list_validated() {
         Ok(devices) => devices,
         Err(error) => {
             assert!(std::env::var_os("CI").is_none(), "{error}");
@@ -279,11 +279,7 @@ fn assert_stays_in_application_buffer(mapping: Mapping) {
             let offset = 5 * encoding.bytes() as u64;
             let size = expected.len() as u64;
             let (buffer, memory) = application.buffer(offset + size);
-            let stretch = |offset, size| VulkanBuffer {
-                buffer,
-                offset,
-                size,
-            };
+            let stretch = |offset, size| VulkanBuffer::new(buffer, size).at(offset);
             let write = |stretch| {
                 // SAFETY: the buffer is as it must be, and nothing else uses it.
                 unsafe {
@@ -340,11 +336,7 @@ fn assert_stays_in_application_buffer(mapping: Mapping) {
         }
     }
     let clip = cpu.upload(&set, method::SLERP).unwrap();
-    let nowhere = VulkanBuffer {
-        buffer: ash::vk::Buffer::null(),
-        offset: 0,
-        size: u64::MAX,
-    };
+    let nowhere = VulkanBuffer::new(ash::vk::Buffer::null(), u64::MAX);
     // SAFETY: the CPU refuses.
     let result = unsafe { clip.request(&frames).to_buffer(nowhere) };
     assert!(result.is_err());
@@ -491,7 +483,7 @@ fn queues_that_cannot_do_their_work_are_refused() {
         assert_eq!(found, family);
     }
     let queue = application.queue;
-    let copies = |family| Some(VulkanQueue { queue, family });
+    let copies = |family| Some(VulkanQueue::new(queue, family));
     let error = application.refused(|handles| handles.copy_queue = copies(1000));
     assert!(
         error.to_string().contains("family 1000, which cannot copy"),
@@ -661,7 +653,7 @@ fn handles_that_cannot_be_are_refused() {
     let null = |name| VulkanError::NullHandle { name };
     let queue = vk::Queue::null();
     assert_eq!(refused(&|handles| handles.queue = queue), null("queue"));
-    let copies = Some(VulkanQueue { queue, family: 0 });
+    let copies = Some(VulkanQueue::new(queue, 0));
     let found = refused(&|handles| handles.copy_queue = copies);
     assert_eq!(found, null("copy_queue"));
     let found = refused(&|handles| handles.physical_device = vk::PhysicalDevice::null());
@@ -707,11 +699,7 @@ fn ranges_beyond_their_buffer_are_refused() {
     let frames = SampleTimes::fps(30);
     let buffer = ApplicationBuffer::of(&application, &[0; 4096]);
     let request = clip.request(&frames);
-    let null = VulkanBuffer {
-        buffer: vk::Buffer::null(),
-        offset: 0,
-        size: 4096,
-    };
+    let null = VulkanBuffer::new(vk::Buffer::null(), 4096);
     // 31 rotations take 496 bytes.
     let at_end = u64::MAX / 256 * 256;
     let mut wrong = vec![null];

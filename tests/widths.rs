@@ -78,23 +78,10 @@ fn hashes() -> String {
     let direction = Direction::Point(DVec3::new(0.0, 2.0, 9.0));
     for follow in [
         base.clone(),
-        Follow {
-            axes,
-            ..base.clone()
-        },
-        Follow {
-            speed,
-            ..base.clone()
-        },
-        Follow {
-            frame,
-            direction,
-            ..base.clone()
-        },
-        Follow {
-            frame: PathFrame::Frenet,
-            ..base
-        },
+        base.clone().with_axes(axes),
+        base.clone().with_speed(speed),
+        base.clone().with_frame(frame).with_direction(direction),
+        base.with_frame(PathFrame::Frenet),
     ] {
         let frames = SampleTimes::fps(997).between(-0.1, 12.1);
         let found = engine.follow(&set, &follow, &frames, Layout::TrackMajor);

@@ -1,6 +1,7 @@
 //! The caller's pointers and sizes, checked before they are used.
 
 use std::ffi::{CStr, c_char, c_void};
+use std::mem::MaybeUninit;
 
 use tumble::ash::vk::Handle;
 
@@ -86,48 +87,112 @@ pub(crate) fn vulkan<T: Handle>(pointer: *mut c_void, name: &str) -> Result<T, F
     Ok(T::from_raw(pointer.expose_provenance() as u64))
 }
 
-/// The caller's structure, whose first member is its size; `None` if the pointer is null.
+/// A structure whose first member is its size. Later versions add members at the end only, for which 0 means what the
+/// versions before did, so that programs may be older than the library.
 ///
 /// # Safety
-/// The pointer must be null or unaligned, or point to a structure whose first member is its size in bytes and that has
-/// this size.
-pub(crate) unsafe fn sized<T: Copy>(
+/// The structure is `repr(C)`, its first member is a `usize`, and zeros are valid values of all members.
+pub(crate) unsafe trait SizedStructure: Copy {
+    /// The size of the first version's structure, bytes.
+    const FIRST_SIZE: usize;
+}
+
+/// The caller's structure, whose members beyond its size are 0.
+///
+/// # Safety
+/// The pointer must not be null and must be aligned; it must point to a structure whose first member is its size in
+/// bytes.
+unsafe fn of_any_version<T: SizedStructure>(
     pointer: *const T,
-    size: impl FnOnce(*const T) -> *const usize,
+    name: impl FnOnce() -> String,
+) -> Result<T, Failure> {
+    // SAFETY: aligned and not null; the first member is there in every version of the structure.
+    let size = unsafe { pointer.cast::<usize>().read() };
+    let newest = size_of::<T>();
+    if !(T::FIRST_SIZE..=newest).contains(&size) || !size.is_multiple_of(align_of::<T>()) {
+        let expected = match T::FIRST_SIZE == newest {
+            true => format!("{newest} bytes"),
+            false => format!("{} to {newest} bytes", T::FIRST_SIZE),
+        };
+        return Err(Failure::argument(format!(
+            "`{}size` is {size}, and the structure has {expected}; set it to `sizeof`, with a header that is not \
+             newer than the library",
+            name()
+        )));
+    }
+    let mut structure = MaybeUninit::<T>::zeroed();
+    // SAFETY: the caller's structure has `size` bytes, this one as many or more, and all its members are set: zeros
+    // are valid.
+    unsafe {
+        let bytes = structure.as_mut_ptr().cast::<u8>();
+        pointer.cast::<u8>().copy_to_nonoverlapping(bytes, size);
+        Ok(structure.assume_init())
+    }
+}
+
+/// The caller's structure; `None` if the pointer is null.
+///
+/// # Safety
+/// The pointer must be null or unaligned, or point to a structure whose first member is its size in bytes.
+pub(crate) unsafe fn sized<T: SizedStructure>(
+    pointer: *const T,
     name: &str,
 ) -> Result<Option<T>, Failure> {
     if pointer.is_null() {
         return Ok(None);
     }
     check(pointer, name)?;
-    // SAFETY: aligned and not null; the first member is there in every version of the structure.
-    let size = unsafe { size(pointer).read() };
-    if size != size_of::<T>() {
-        return Err(Failure::argument(format!(
-            "`{name}->size` is {size}, and this version's structure has {} bytes; set it to \
-             `sizeof`, with the header of the library's version",
-            size_of::<T>()
-        )));
-    }
-    // SAFETY: it has the size that this version's has.
-    Ok(Some(unsafe { pointer.read() }))
+    // SAFETY: not null and aligned; the rest is the caller's promise.
+    unsafe { of_any_version(pointer, || format!("{name}->")).map(Some) }
 }
 
 /// As [`sized`], but a null pointer is an error.
 ///
 /// # Safety
 /// As [`sized`].
-pub(crate) unsafe fn needed<T: Copy>(
+pub(crate) unsafe fn needed<T: SizedStructure>(
     pointer: *const T,
-    size: impl FnOnce(*const T) -> *const usize,
     name: &str,
 ) -> Result<T, Failure> {
     // SAFETY: the caller's promise.
-    let found = unsafe { sized(pointer, size, name)? };
+    let found = unsafe { sized(pointer, name)? };
     found.ok_or_else(|| {
         let message = format!("`{name}` is null");
         Failure::new(TumbleResult::InvalidPointer, message)
     })
+}
+
+/// The caller's list of `count` structures, all of one version; empty if `count` is 0, for any pointer.
+///
+/// # Safety
+/// If `count` is not 0 and `pointer` is neither null nor unaligned, it must point to `count` structures, each of the
+/// size that its first member says, which do not change while the iterator is used.
+pub(crate) unsafe fn sized_list<T: SizedStructure>(
+    pointer: *const T,
+    count: usize,
+    name: &str,
+) -> Result<impl Iterator<Item = Result<T, Failure>>, Failure> {
+    product::<T>(count, 1, name)?;
+    let mut stride = 0;
+    if count > 0 {
+        check(pointer, name)?;
+        // SAFETY: aligned and not null; the first member is there in every version of the structure.
+        stride = unsafe { pointer.cast::<usize>().read() };
+    }
+    Ok((0..count).map(move |index| {
+        let named = || format!("{name}[{index}].");
+        // SAFETY: the structures before this one have the size of the first, which is that of a version: a multiple of
+        // the alignment.
+        let structure = unsafe { of_any_version(pointer.byte_add(index * stride), named)? };
+        // SAFETY: as above.
+        let size = unsafe { pointer.byte_add(index * stride).cast::<usize>().read() };
+        if size != stride {
+            return Err(Failure::argument(format!(
+                "`{name}[{index}].size` is {size}, and that of the first is {stride}; set all to `sizeof`"
+            )));
+        }
+        Ok(structure)
+    }))
 }
 
 /// The caller's text; `None` if the pointer is null.
@@ -181,6 +246,21 @@ impl<T> Out<T> {
         // SAFETY: not null and aligned; the rest is the caller's promise. Nothing is dropped that
         // was there before: it may never have been written.
         unsafe { self.pointer.write(value) };
+    }
+}
+
+impl<T: SizedStructure> Out<T> {
+    /// Writes the first `size` bytes of a structure, which the caller's has.
+    ///
+    /// # Safety
+    /// As [`Out::set`], for memory of `size` bytes.
+    pub(crate) unsafe fn set_sized(self, value: &T, size: usize) {
+        if self.pointer.is_null() {
+            return;
+        }
+        let bytes: *const u8 = (&raw const *value).cast();
+        // SAFETY: not null; the rest is the caller's promise.
+        unsafe { bytes.copy_to_nonoverlapping(self.pointer.cast(), size.min(size_of::<T>())) };
     }
 }
 

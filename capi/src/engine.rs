@@ -1,11 +1,12 @@
 //! Engines: open devices that evaluate.
 
 use std::ffi::{CString, c_char};
+use std::mem::offset_of;
 
 use tumble::vulkan::VulkanError;
 use tumble::{CacheFiles, Device, Engine, EngineOptions, Error};
 
-use crate::arguments::{Out, flag, sized, text};
+use crate::arguments::{Out, SizedStructure, flag, sized, text};
 use crate::handle::{self, Object};
 use crate::result::{Failure, TumbleResult, code, guarded};
 
@@ -56,6 +57,11 @@ pub struct TumbleEngineOptions {
     pub cache_directory: *const c_char,
 }
 
+// SAFETY: `repr(C)`, the size is first, and zeros are numbers and null pointers.
+unsafe impl SizedStructure for TumbleEngineOptions {
+    const FIRST_SIZE: usize = offset_of!(Self, cache_directory);
+}
+
 /// Opens a device and creates an engine on it.
 ///
 /// `device` selects the device by a name in upper or lower case:
@@ -104,10 +110,7 @@ impl TumbleEngineOptions {
     /// a zero byte.
     pub(crate) unsafe fn read(pointer: *const Self) -> Result<EngineOptions, Failure> {
         // SAFETY: as the caller promises.
-        let options = unsafe {
-            let size = |pointer: *const Self| (&raw const (*pointer).size).cast();
-            sized(pointer, size, "options")?
-        };
+        let options = unsafe { sized(pointer, "options")? };
         let Some(structure) = options else {
             return Ok(EngineOptions::default());
         };

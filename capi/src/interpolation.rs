@@ -9,7 +9,7 @@ use tumble::{
     WrapMode, method,
 };
 
-use crate::arguments::{option, sized, text};
+use crate::arguments::{SizedStructure, option, sized, text};
 use crate::result::Failure;
 
 /// Which sign of each key is used: `q` and `-q` are the same rotation. The method "gltf-cubic" ignores
@@ -121,6 +121,11 @@ pub struct TumbleInterpolation {
     pub bias: f64,
 }
 
+// SAFETY: `repr(C)`, the size is first, and zeros are numbers and null pointers.
+unsafe impl SizedStructure for TumbleInterpolation {
+    const FIRST_SIZE: usize = size_of::<Self>();
+}
+
 impl TumbleInterpolation {
     /// The interpolation of a structure; for null the default method with its defaults.
     ///
@@ -141,10 +146,7 @@ impl TumbleInterpolation {
         other: impl FnOnce() -> Result<Method, Failure>,
     ) -> Result<Interpolation, Failure> {
         // SAFETY: as the caller promises.
-        let structure = unsafe {
-            let size = |pointer: *const Self| (&raw const (*pointer).size).cast();
-            sized(pointer, size, "interpolation")?
-        };
+        let structure = unsafe { sized(pointer, "interpolation")? };
         let Some(structure) = structure else {
             return Ok(other()?.into());
         };
@@ -170,19 +172,26 @@ impl TumbleInterpolation {
             ends => ends,
         });
         let ends = [&[method.ends], &named[..]].concat();
-        let options = InterpolationOptions {
-            signs: Some(path),
-            ends: Some(option(self.ends, &ends, "interpolation->ends")?),
-            tcb: Tcb {
+        let options = InterpolationOptions::default()
+            .with_signs(Some(path))
+            .with_ends(Some(option(self.ends, &ends, "interpolation->ends")?))
+            .with_tcb(Tcb {
                 tension: self.tension,
                 continuity: self.continuity,
                 bias: self.bias,
-            },
-            quantity: option(self.quantity, &Quantity::ALL, "interpolation->quantity")?,
-            speed: option(self.speed, &Speed::ALL, "interpolation->speed")?,
-            before: option(self.before, &WrapMode::ALL, "interpolation->before")?,
-            after: option(self.after, &WrapMode::ALL, "interpolation->after")?,
-        };
+            })
+            .with_quantity(option(
+                self.quantity,
+                &Quantity::ALL,
+                "interpolation->quantity",
+            )?)
+            .with_speed(option(self.speed, &Speed::ALL, "interpolation->speed")?)
+            .with_before(option(
+                self.before,
+                &WrapMode::ALL,
+                "interpolation->before",
+            )?)
+            .with_after(option(self.after, &WrapMode::ALL, "interpolation->after")?);
         Ok(options.with(method))
     }
 }

@@ -7,7 +7,7 @@ use glam::Quat;
 use tumble::vulkan::{PassRequest, PassTarget, PosePass, VulkanBuffer};
 use tumble::{Error, Skeleton};
 
-use crate::arguments::{Out, list, needed, option, product, vulkan};
+use crate::arguments::{Out, SizedStructure, list, needed, option, product, vulkan};
 use crate::engine::TumbleEngine;
 use crate::handle::{self, Object};
 use crate::result::{Failure, TumbleResult, code};
@@ -76,6 +76,11 @@ pub struct TumblePass {
     pub offsets: *const f32,
 }
 
+// SAFETY: `repr(C)`, the size is first, and zeros are numbers and null pointers.
+unsafe impl SizedStructure for TumblePass {
+    const FIRST_SIZE: usize = size_of::<Self>();
+}
+
 /// The inputs and weights of a pass must be as many as its operation takes.
 fn exactly<const N: usize, T: Copy>(found: &[T], name: &str) -> Result<[T; N], Failure> {
     found.try_into().map_err(|_| {
@@ -97,10 +102,7 @@ impl TumblePass {
         work: impl FnOnce(PassRequest<'_>) -> Result<T, Failure>,
     ) -> Result<T, Failure> {
         // SAFETY: as the caller promises.
-        let structure = unsafe {
-            let size = |pointer: *const Self| (&raw const (*pointer).size).cast();
-            needed(pointer, size, "pass")?
-        };
+        let structure = unsafe { needed(pointer, "pass")? };
         let operations = [
             TumblePassOperation::Blend,
             TumblePassOperation::Mix,

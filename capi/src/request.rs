@@ -7,7 +7,7 @@ use std::sync::LazyLock;
 use tumble::vulkan::ClipTarget;
 use tumble::{Clip, Encoding, EncodingOptions, Error, EulerSequence, MatrixOrder, Request};
 
-use crate::arguments::{Out, list_mut, needed, option, text, vulkan};
+use crate::arguments::{Out, SizedStructure, list_mut, needed, option, text, vulkan};
 use crate::clip::TumbleClip;
 use crate::handle::{self, Object};
 use crate::result::{Failure, TumbleResult, code};
@@ -53,6 +53,11 @@ pub struct TumbleRequest {
     pub sample_count: usize,
 }
 
+// SAFETY: `repr(C)`, the size is first, and zeros are numbers and null pointers.
+unsafe impl SizedStructure for TumbleRequest {
+    const FIRST_SIZE: usize = size_of::<Self>();
+}
+
 impl TumbleRequest {
     /// Calls `work` with the request of a structure; null is an error.
     ///
@@ -65,8 +70,7 @@ impl TumbleRequest {
     ) -> Result<T, Failure> {
         // SAFETY: as the caller promises.
         let (structure, frames) = unsafe {
-            let size = |pointer: *const Self| (&raw const (*pointer).size).cast();
-            let structure = needed(pointer, size, "request")?;
+            let structure = needed(pointer, "request")?;
             (structure, TumbleSamples::read(structure.samples)?)
         };
         // SAFETY: as the caller promises.
@@ -97,7 +101,13 @@ impl TumbleRequest {
         let request = clip
             .request(&frames)
             .layout(layout(structure.layout)?)
-            .encoding(encoding.with(EncodingOptions { order, sequence }))
+            .encoding(
+                encoding.with(
+                    EncodingOptions::default()
+                        .with_order(order)
+                        .with_sequence(sequence),
+                ),
+            )
             .tracks(part(structure.first_track, structure.track_count, tracks))
             .samples(part(
                 structure.first_sample,

@@ -2,7 +2,7 @@
 
 use tumble::{FrameRate, Layout, SampleTimes};
 
-use crate::arguments::{constant, list, needed, option};
+use crate::arguments::{SizedStructure, constant, list, needed, option};
 use crate::result::Failure;
 
 /// The order of a result in memory. Each sample of a track has one value: four numbers, or in a request as many as
@@ -54,6 +54,11 @@ pub struct TumbleSamples {
     pub time_count: usize,
 }
 
+// SAFETY: `repr(C)`, the size is first, and zeros are numbers and null pointers.
+unsafe impl SizedStructure for TumbleSamples {
+    const FIRST_SIZE: usize = size_of::<Self>();
+}
+
 impl TumbleSamples {
     /// The sample times of a structure; null is an error.
     ///
@@ -61,10 +66,7 @@ impl TumbleSamples {
     /// The pointer must be null or point to such a structure, whose `times` has `time_count` numbers.
     pub(crate) unsafe fn read(pointer: *const Self) -> Result<SampleTimes, Failure> {
         // SAFETY: as the caller promises.
-        let structure = unsafe {
-            let size = |pointer: *const Self| (&raw const (*pointer).size).cast();
-            needed(pointer, size, "samples")?
-        };
+        let structure = unsafe { needed(pointer, "samples")? };
         let rate = || FrameRate::new(structure.rate_frames, structure.rate_seconds.max(1));
         // SAFETY: as the caller promises.
         let times = || unsafe { list(structure.times, structure.time_count, "samples->times") };

@@ -406,6 +406,49 @@ fn constants_names_and_versions_are_checked() {
     assert_eq!(version, reported);
 }
 
+/// Programs that were compiled with an older header: what their structures have not is neither read nor written, and
+/// counts as 0. Sizes of no version are refused, and those of newer headers.
+#[test]
+fn structures_of_older_versions_are_taken() {
+    let first = std::mem::offset_of!(TumbleEngineOptions, cache_directory);
+    let opened = |size: usize| {
+        let options = TumbleEngineOptions {
+            size,
+            memory: 1 << 30,
+            threads: 1,
+            allow_inexact: 0,
+            // Behind an older structure lies anything.
+            cache_directory: std::ptr::without_provenance(1),
+        };
+        let mut engine = null_mut();
+        // SAFETY: text, room for the handle, and a structure of that size or a refused one.
+        let result =
+            unsafe { tumble_engine_open(c"cpu".as_ptr(), &raw const options, &raw mut engine) };
+        if result == TumbleResult::Ok {
+            assert_eq!(tumble_engine_free(engine), TumbleResult::Ok);
+        }
+        result
+    };
+    assert_eq!(opened(first), TumbleResult::Ok, "{}", words());
+    let newest = size_of::<TumbleEngineOptions>();
+    for size in [
+        0,
+        8,
+        first - 8,
+        first + 1,
+        first + 4,
+        newest + 8,
+        usize::MAX,
+    ] {
+        fails(opened(size), TumbleResult::InvalidArgument, "options->size");
+        assert!(
+            words().contains(&format!("{first} to {newest} bytes")),
+            "{}",
+            words()
+        );
+    }
+}
+
 #[test]
 fn devices_files_and_methods_are_found_or_named() {
     let mut engine = null_mut();

@@ -1,13 +1,14 @@
 //! Engines on an application's Vulkan device.
 
 use std::ffi::{CStr, c_void};
+use std::mem::offset_of;
 
 use tumble::Engine;
 use tumble::ash::vk::Handle;
 use tumble::ash::{self, vk};
 use tumble::vulkan::{QueueLock, VulkanBuffer, VulkanHandles, VulkanQueue};
 
-use crate::arguments::{Out, flag, needed, vulkan};
+use crate::arguments::{Out, SizedStructure, flag, needed, vulkan};
 use crate::engine::{TumbleEngine, TumbleEngineOptions};
 use crate::handle;
 use crate::result::{Failure, TumbleResult, code};
@@ -65,6 +66,11 @@ pub struct TumbleVulkan {
     pub pipeline_cache: u64,
 }
 
+// SAFETY: `repr(C)`, the size is first, and zeros are numbers, null pointers and no functions.
+unsafe impl SizedStructure for TumbleVulkan {
+    const FIRST_SIZE: usize = offset_of!(Self, pipeline_cache);
+}
+
 /// The argument of the application's functions that lock and unlock the queue.
 #[derive(Clone, Copy)]
 struct User(*mut c_void);
@@ -120,10 +126,10 @@ impl TumbleVulkan {
         let copy_queue = if self.copy_queue.is_null() {
             None
         } else {
-            Some(VulkanQueue {
-                queue: vulkan(self.copy_queue, "vulkan->copy_queue")?,
-                family: self.copy_queue_family,
-            })
+            Some(VulkanQueue::new(
+                vulkan(self.copy_queue, "vulkan->copy_queue")?,
+                self.copy_queue_family,
+            ))
         };
         let shader_float_controls =
             flag(self.shader_float_controls, "vulkan->shader_float_controls")?;
@@ -156,21 +162,22 @@ impl TumbleVulkan {
         let instance = unsafe { ash::Instance::load(entry.static_fn(), instance) };
         // SAFETY: the device is valid, as the caller promises.
         let device = unsafe { ash::Device::load(instance.fp_v1_0(), device) };
-        Ok(VulkanHandles {
+        let mut handles = VulkanHandles::new(
             entry,
             instance,
-            api_version: self.api_version,
+            self.api_version,
             physical_device,
             device,
-            shader_float_controls,
-            shader_int64,
-            queue,
-            queue_family: self.queue_family,
-            copy_queue,
-            queue_lock: self.queue_lock()?,
-            pipeline_cache: (self.pipeline_cache != 0)
-                .then(|| vk::PipelineCache::from_raw(self.pipeline_cache)),
-        })
+            VulkanQueue::new(queue, self.queue_family),
+        );
+        handles.shader_float_controls = shader_float_controls;
+        handles.shader_int64 = shader_int64;
+        let cache =
+            (self.pipeline_cache != 0).then(|| vk::PipelineCache::from_raw(self.pipeline_cache));
+        Ok(handles
+            .with_copy_queue(copy_queue)
+            .with_queue_lock(self.queue_lock()?)
+            .with_pipeline_cache(cache))
     }
 }
 
@@ -190,11 +197,7 @@ pub(crate) fn buffer_range(
         let message = "`buffer` is VK_NULL_HANDLE";
         return Err(Failure::new(TumbleResult::InvalidPointer, message));
     }
-    Ok(VulkanBuffer {
-        buffer: vk::Buffer::from_raw(buffer),
-        offset,
-        size,
-    })
+    Ok(VulkanBuffer::new(vk::Buffer::from_raw(buffer), size).at(offset))
 }
 
 /// Creates an engine on an application's Vulkan device. It evaluates as any other engine, and can record crowds,
@@ -231,8 +234,7 @@ pub unsafe extern "C" fn tumble_engine_from_vulkan(
         let out = Out::new(engine, "engine")?;
         // SAFETY: as the caller promises.
         let (structure, options) = unsafe {
-            let size = |pointer: *const TumbleVulkan| (&raw const (*pointer).size).cast();
-            let vulkan = needed(vulkan, size, "vulkan")?;
+            let vulkan = needed(vulkan, "vulkan")?;
             (vulkan, TumbleEngineOptions::read(options)?)
         };
         // SAFETY: as the caller promises.

@@ -22,6 +22,8 @@ mod examples;
 mod faults;
 mod features;
 mod follow;
+#[cfg(unix)]
+mod interface;
 mod json;
 mod lab;
 mod motion;

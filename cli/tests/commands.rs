@@ -215,7 +215,7 @@ fn the_table_of_options_is_that_of_the_program() {
 fn every_file_of_tests_is_run() {
     /// Separate programs (`Cargo.toml`), and those that only Unix has.
     const PROGRAMS: [&str; 3] = ["all", "fuzz", "options"];
-    const UNIX: [&str; 2] = ["attack", "remedies"];
+    const UNIX: [&str; 3] = ["attack", "interface", "remedies"];
     let entries = fs::read_dir(here().join("tests")).unwrap();
     let mut files: Vec<String> = entries
         .filter_map(|entry| {

@@ -60,15 +60,13 @@ fn results_are_the_library_s_bits() {
     succeed(folder.path(), &line);
     let (shape, found) = numbers(&folder.path().join("out.npy"));
     assert_eq!(shape, [271, 1, 7]);
-    let follow = Follow {
-        method: VectorMethod::C2,
-        speed: PathSpeed::Eased {
+    let follow = Follow::default()
+        .with_method(VectorMethod::C2)
+        .with_speed(PathSpeed::Eased {
             start: 0.2,
             end: 0.3,
-        },
-        axes: ["-x".parse().unwrap(), "z".parse().unwrap()],
-        ..Follow::default()
-    };
+        })
+        .with_axes(["-x".parse().unwrap(), "z".parse().unwrap()]);
     let engine = Engine::new(Device::Cpu).unwrap();
     let expected = engine
         .follow(&set(), &follow, &SampleTimes::fps(60), Layout::FrameMajor)
@@ -275,10 +273,7 @@ fn smoothed_keys_are_the_library_s() {
     let unsmoothed = engine
         .evaluate(&set, method::BESSEL_OVERHAUSER, &frames)
         .unwrap();
-    let smoothing = Smoothing {
-        passes: 2,
-        ..Smoothing::new("tent:2".parse().unwrap())
-    };
+    let smoothing = Smoothing::new("tent:2".parse().unwrap()).with_passes(2);
     let expected = engine.smooth(&unsmoothed, &smoothing).unwrap();
     for (found, expected) in found.chunks(4).zip(expected.as_quats()) {
         assert!(Quat::from_slice(found).dot(*expected).abs() > 1.0 - 1e-6);

@@ -320,18 +320,15 @@ fn scalars_are_those_of_scipy() {
     for (name, curve) in curves {
         let (how, ends) = name.split_once('/').unwrap_or((name, "parabolic"));
         let how = if how == "hermite" { "gltf-cubic" } else { how };
-        let interpolation = Interpolation {
-            ends: match ends {
-                "natural" => Ends::Natural,
-                "clamped" => Ends::Clamped {
-                    start: DVec3::ZERO,
-                    end: DVec3::ZERO,
-                },
-                "secant" => Ends::Secant,
-                _ => Ends::Parabolic,
+        let interpolation = Interpolation::from(method::SLERP).with_ends(match ends {
+            "natural" => Ends::Natural,
+            "clamped" => Ends::Clamped {
+                start: DVec3::ZERO,
+                end: DVec3::ZERO,
             },
-            ..method::SLERP.into()
-        };
+            "secant" => Ends::Secant,
+            _ => Ends::Parabolic,
+        });
         let how: VectorMethod = how.parse().unwrap();
         for (quantity, list_name) in
             ScalarQuantity::ALL

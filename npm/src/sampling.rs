@@ -68,10 +68,7 @@ impl SampleCall {
     }
 
     fn options(&self) -> Result<InterpolationOptions, Fault> {
-        let mut options = InterpolationOptions {
-            quantity: self.quantity(),
-            ..InterpolationOptions::default()
-        };
+        let mut options = InterpolationOptions::default().with_quantity(self.quantity());
         for (name, value) in &self.options {
             let option = InterpolationOption::named(name)
                 .ok_or_else(|| Fault::new(format!("there is no option `{name}`")))?;

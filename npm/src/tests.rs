@@ -96,10 +96,7 @@ fn samplers_have_the_bits_of_listed_times() {
     );
     call(&mut calls, 5, json!({"clip": 0}), Vec::new()).unwrap();
     let times = [0.1, 2.9, -1.0, 7.3];
-    let interpolation = Interpolation {
-        after: WrapMode::Loop,
-        ..method::C2.into()
-    };
+    let interpolation = Interpolation::from(method::C2).with_after(WrapMode::Loop);
     let engine = Engine::new(Device::Cpu).unwrap();
     let frames = SampleTimes::at(times.to_vec());
     let right = engine.evaluate(&clip.set, interpolation, &frames).unwrap();

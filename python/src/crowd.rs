@@ -4,7 +4,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use tumble::crowd::{CrowdLayer, CrowdLibrary, CrowdValues};
+use tumble::crowd::{CrowdLayer, CrowdLibrary, CrowdValues, LayerBlend};
 use tumble::{ComponentType, WrapMode};
 
 use crate::arrays::{ArrayValues, ListArgument, doubles};
@@ -244,15 +244,16 @@ impl Crowd {
                 let mut crowd = self.lock();
                 let mut changes = Vec::with_capacity(count);
                 for (index, &instance) in instances.iter().enumerate() {
-                    let plays = CrowdLayer {
-                        clip: clips[index],
-                        time: crowd.ticks_of(times[index]).map_err(of_crowd)?,
-                        speed: speeds[index] as f32,
-                        wrap: wrap.unwrap_or(WrapMode::Loop),
-                        weight: weights[index] as f32,
-                        additive,
-                        mask,
-                    };
+                    let plays = CrowdLayer::new(clips[index])
+                        .at(crowd.ticks_of(times[index]).map_err(of_crowd)?)
+                        .with_speed(speeds[index] as f32)
+                        .with_wrap(wrap.unwrap_or(WrapMode::Loop))
+                        .with_weight(weights[index] as f32)
+                        .with_blend(match additive {
+                            true => LayerBlend::Additive,
+                            false => LayerBlend::Over,
+                        })
+                        .with_mask(mask);
                     changes.push((instance, layer, plays));
                 }
                 crowd.set_all(&changes).map_err(of_crowd)

@@ -77,20 +77,21 @@ impl FollowOptions<'_, '_> {
             },
         };
         let rest = Follow::default();
-        Ok(Follow {
-            method,
-            ends: self.ends.map_or(Ok(rest.ends), ends)?,
-            direction,
-            frame: self
-                .frame
-                .map_or(Ok(rest.frame), |name| option_of(name, "frame"))?,
-            up: DVec3::from_array(self.up),
-            twist: self
-                .twist
-                .map_or(Ok(rest.twist), |name| option_of(name, "twist"))?,
-            speed,
-            axes: [axis("forward", self.forward)?, axis("upward", self.upward)?],
-        })
+        Ok(Follow::default()
+            .with_method(method)
+            .with_ends(self.ends.map_or(Ok(rest.ends), ends)?)
+            .with_direction(direction)
+            .with_frame(
+                self.frame
+                    .map_or(Ok(rest.frame), |name| option_of(name, "frame"))?,
+            )
+            .with_up(DVec3::from_array(self.up))
+            .with_twist(
+                self.twist
+                    .map_or(Ok(rest.twist), |name| option_of(name, "twist"))?,
+            )
+            .with_speed(speed)
+            .with_axes([axis("forward", self.forward)?, axis("upward", self.upward)?]))
     }
 
     fn pace(&self) -> PyResult<Option<Pace>> {

@@ -130,10 +130,7 @@ impl EvaluationKeywords {
     pub(crate) fn methods(&self, quantity: Quantity) -> ChannelMethods {
         ChannelMethods {
             method: self.method,
-            options: InterpolationOptions {
-                quantity,
-                ..self.options
-            },
+            options: self.options.with_quantity(quantity),
         }
     }
 }

@@ -170,7 +170,7 @@ impl Job<'_> {
     fn nanoseconds(&self) -> f64 {
         let of_key = |interpolation: &Interpolation| match interpolation.speed {
             Speed::Constant => CONSTANT_SPEED,
-            Speed::AsKeyed => interpolation.method.cost.key,
+            _ => interpolation.method.cost.key,
         };
         let all = self.interpolations.values();
         let key = all.iter().map(of_key).fold(0.0, f64::max);

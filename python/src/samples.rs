@@ -143,11 +143,9 @@ impl Smooth<'_> {
         let kernel = self.kernel.unwrap_or("gaussian:2").parse();
         let kernel = kernel.map_err(|error| of_kernel("kernel", &error))?;
         let ends: SmoothingEnds = option_named(self.ends, "ends")?;
-        Ok(Smoothing {
-            kernel,
-            ends,
-            passes: self.passes,
-        })
+        Ok(Smoothing::new(kernel)
+            .with_ends(ends)
+            .with_passes(self.passes))
     }
 }
 

@@ -74,7 +74,7 @@ impl Verification {
         let groups = groups.groups(clip.set.track_count());
         let groups = groups.map_err(|error| of_engine(&error.into()))?;
         let is_one = groups.len() == 1;
-        for TrackGroup { value, tracks } in groups {
+        for TrackGroup { value, tracks, .. } in groups {
             let set = clip.set.select(tracks.iter().copied());
             let set = set.map_err(|error| of_engine(&error.into()))?;
             let frames = request.frames(clip, Some(&tracks))?;

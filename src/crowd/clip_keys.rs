@@ -20,6 +20,7 @@ const LARGEST: i32 = (1 << 19) - 1;
 
 /// How keys of rotations are stored in [`MotionTables`](crate::crowd::MotionTables).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[non_exhaustive]
 pub enum KeyPrecision {
     /// As they are, 16 bytes each. Rotations have the bits of a crowd.
     #[default]

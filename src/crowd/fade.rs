@@ -2,6 +2,7 @@
 
 use crate::crowd_error::CrowdError;
 use crate::memory::{OutOfMemoryError, zeroed};
+use crate::names::fields::with_fields;
 use crate::shader::WEIGHT_UNIT;
 
 /// A weight that changes linearly with the clock.
@@ -10,6 +11,7 @@ use crate::shader::WEIGHT_UNIT;
 /// runs, and is `to` afterwards. It is computed in whole numbers from the clock alone: one large step of the clock
 /// leads to the same weight as many small ones, and the clock may go back.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct CrowdFade {
     /// The weight before the fade, 0 to 1, rounded to a multiple of 2^-15.
     pub from: f32,
@@ -19,6 +21,25 @@ pub struct CrowdFade {
     pub start: u64,
     /// The duration of the fade, ticks; with 0 the weight changes at once.
     pub ticks: u64,
+}
+
+with_fields! {
+    CrowdFade:
+    with_start(start: u64),
+    with_ticks(ticks: u64),
+}
+
+impl CrowdFade {
+    /// A weight that changes at once, at the start of the clock.
+    #[must_use]
+    pub fn new(from: f32, to: f32) -> Self {
+        Self {
+            from,
+            to,
+            start: 0,
+            ticks: 0,
+        }
+    }
 }
 
 /// A weight in units of 2^-15.

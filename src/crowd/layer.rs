@@ -2,6 +2,8 @@
 
 use crate::crowd::fade::weight_units;
 use crate::crowd_error::{CrowdError, FASTEST, MAX_MASKS};
+use crate::names::fields::with_fields;
+use crate::names::names;
 use crate::shader::{
     CrowdClip, CrowdEntry, RUNS_BACKWARDS, SPEED_MAGNITUDE, START_BIAS, WEIGHT_UNIT, WRAP_HOLD,
     WRAP_LOOP, WRAP_MIRROR,
@@ -18,6 +20,7 @@ const SPEED_UNITS: f32 = 65536.0;
 /// ([`CrowdLibrary::ticks_per_second`](crate::crowd::library::CrowdLibrary::ticks_per_second)). Speeds are rounded to
 /// multiples of 2^-16 and weights to multiples of 2^-15.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct CrowdLayer {
     /// The clip's index in the library.
     pub clip: usize,
@@ -31,11 +34,36 @@ pub struct CrowdLayer {
     /// The weight with which the layer is blended over the layers below, 0 to 1. The weight of the first layer is
     /// ignored.
     pub weight: f32,
-    /// Whether the clip's difference from its reference pose is added to the layers below; otherwise the layers below
-    /// are interpolated towards the clip.
-    pub additive: bool,
+    /// How the clip is combined with the layers below.
+    pub blend: LayerBlend,
     /// The index of a mask of the library; `None`: all joints take part.
     pub mask: Option<usize>,
+}
+
+/// How a layer of an instance is combined with the layers below.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[non_exhaustive]
+pub enum LayerBlend {
+    /// The layers below are interpolated towards the clip.
+    #[default]
+    Over,
+    /// The clip's difference from its reference pose is added to the layers below.
+    Additive,
+}
+
+names! {
+    LayerBlend, "blend",
+    Over => "over",
+    Additive => "additive",
+}
+
+with_fields! {
+    CrowdLayer:
+    with_speed(speed: f32),
+    with_wrap(wrap: WrapMode),
+    with_weight(weight: f32),
+    with_blend(blend: LayerBlend),
+    with_mask(mask: Option<usize>),
 }
 
 impl CrowdLayer {
@@ -48,7 +76,7 @@ impl CrowdLayer {
             speed: 1.0,
             wrap: WrapMode::Loop,
             weight: 1.0,
-            additive: false,
+            blend: LayerBlend::Over,
             mask: None,
         }
     }
@@ -98,7 +126,7 @@ impl CrowdLayer {
         let modes = if backwards { RUNS_BACKWARDS } else { 0 }
             | mask << 24
             | wrap << 29
-            | u32::from(self.additive) << 31;
+            | u32::from(self.blend == LayerBlend::Additive) << 31;
         // The anchor lies up to 255 ticks before the clock; the layer has moved since.
         let moved = i64::from(units) * (clock & 0xff) as i64;
         let moved = if backwards { -moved } else { moved } >> 16;
@@ -136,7 +164,7 @@ impl CrowdLayer {
                 _ => WrapMode::Mirror,
             },
             weight: (entry.clip_and_weight >> 16) as f32 * WEIGHT_UNIT,
-            additive: modes >> 31 != 0,
+            blend: LayerBlend::ALL[(modes >> 31) as usize],
             mask: (((modes >> 24) & 0x1f) as usize).checked_sub(1),
         }
     }

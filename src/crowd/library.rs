@@ -8,6 +8,7 @@ use rayon::prelude::*;
 
 use crate::crowd::clip_keys::KeyPrecision;
 use crate::crowd::clip_tables::{ClipTables, MAX_ENTRIES};
+use crate::crowd::stages;
 use crate::crowd::states::MotionTables;
 use crate::crowd_error::{CrowdError, MAX_CLIPS, MAX_MASKS, MAX_TICKS};
 use crate::engine::Engine;
@@ -289,6 +290,69 @@ impl CrowdLibrary {
         self.masks
             .extend(weights.iter().map(|&weight| canonical(weight)));
         Ok(mask)
+    }
+
+    /// Continues poses of [`CrowdValues::Local`](crate::crowd::CrowdValues::Local) to those of
+    /// [`CrowdValues::Model`](crate::crowd::CrowdValues::Model), in place, with the same bits as a crowd that evaluates
+    /// these at once. Between the two stages a program may change the transforms, such as by inverse kinematics. `poses`
+    /// are `[instance][joint]`, three rows of four numbers each, of any number of instances; several threads may take a
+    /// part each.
+    ///
+    /// ```
+    /// use tumble::glam::{Quat, Vec3};
+    /// use tumble::crowd::{CrowdLibrary, CrowdValues};
+    /// use tumble::{Device, Engine, Skeleton, TrackSet, VectorMethod, method};
+    /// # let mut walk = TrackSet::new();
+    /// # walk.push("hip", &[0.0, 1.0], &[Quat::IDENTITY, Quat::from_rotation_y(1.0)])?;
+    /// # walk.push("knee", &[0.0, 1.0], &[Quat::IDENTITY, Quat::from_rotation_x(0.5)])?;
+    /// # let skeleton = Skeleton::new(vec![None, Some(0)], vec![Vec3::ZERO, Vec3::new(0.0, -0.5, 0.0)])?;
+    /// # let mut library = CrowdLibrary::new(&skeleton)?;
+    /// # library.push(&walk, method::SLERP, VectorMethod::Linear)?;
+    /// let mut crowd = Engine::new(Device::Cpu)?.crowd(&library, 100, 1)?;
+    /// let mut poses = vec![[0.0; 4]; crowd.output_len(CrowdValues::Local)];
+    /// crowd.evaluate_into(CrowdValues::Local, &mut poses)?;
+    /// for hip in poses.chunks_exact_mut(3 * library.joint_count()) {
+    ///     hip[1][3] += 0.25; // the second row's last number: y of the first joint
+    /// }
+    /// library.local_to_model(&mut poses)?;
+    /// assert_eq!(poses[3 + 1][3], -0.5 + 0.25);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// When `poses` are no whole number of instances.
+    pub fn local_to_model(&self, poses: &mut [[f32; 4]]) -> Result<(), CrowdError> {
+        for pose in self.poses(poses)? {
+            stages::walk(&self.links, pose.as_chunks_mut().0);
+        }
+        Ok(())
+    }
+
+    /// Continues poses of [`CrowdValues::Model`](crate::crowd::CrowdValues::Model) to those of
+    /// [`CrowdValues::Skinning`](crate::crowd::CrowdValues::Skinning), as [`CrowdLibrary::local_to_model`].
+    ///
+    /// # Errors
+    /// When `poses` are no whole number of instances, or the library has no inverse bind matrices.
+    pub fn model_to_skinning(&self, poses: &mut [[f32; 4]]) -> Result<(), CrowdError> {
+        if self.bind.is_empty() {
+            return Err(CrowdError::NoInverseBind);
+        }
+        for pose in self.poses(poses)? {
+            stages::skin(&self.bind, pose.as_chunks_mut().0);
+        }
+        Ok(())
+    }
+
+    /// The instances of poses of three vectors for each joint.
+    fn poses<'a>(
+        &self,
+        poses: &'a mut [[f32; 4]],
+    ) -> Result<std::slice::ChunksExactMut<'a, [f32; 4]>, CrowdError> {
+        let (length, each) = (poses.len(), 3 * self.joint_count());
+        match length.is_multiple_of(each) {
+            true => Ok(poses.chunks_exact_mut(each)),
+            false => Err(CrowdError::PartOfPose { length, each }),
+        }
     }
 
     /// Sets the inverse bind matrix of every joint: the inverse of the joint's model matrix in the bind pose.

@@ -51,11 +51,12 @@ pub(crate) mod layer;
 pub(crate) mod library;
 pub(crate) mod on_cpu;
 pub(crate) mod player;
+pub(crate) mod stages;
 pub(crate) mod states;
 
 pub use crate::crowd::clip_keys::KeyPrecision;
 pub use crate::crowd::fade::CrowdFade;
-pub use crate::crowd::layer::CrowdLayer;
+pub use crate::crowd::layer::{CrowdLayer, LayerBlend};
 pub use crate::crowd::library::{CrowdLibrary, MotionBuilder, MotionClip};
 pub use crate::crowd::player::Crowd;
 pub use crate::crowd::states::{FrameStep, MotionStates, MotionTables, MotionWords};

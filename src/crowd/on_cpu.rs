@@ -6,6 +6,7 @@ use rayon::prelude::*;
 use crate::crowd::clip_tables::{ClipTables, arcs};
 use crate::crowd::lay_over::lay_over;
 use crate::crowd::library::CrowdLibrary;
+use crate::crowd::stages;
 use crate::machine::Machine;
 use crate::output::crowd::{CrowdOutput, CrowdValues, FrameStep};
 use crate::shader::{
@@ -15,7 +16,7 @@ use crate::simd::dispatch::{InLanes, in_lanes_of};
 use crate::simd::lanes::Lanes;
 use crate::threads::OutOfThreadsError;
 use crate::twin::crowd_layers::Layers;
-use crate::twin::crowd_matrices::{affine_product, transform};
+use crate::twin::crowd_matrices::transform;
 use crate::twin::crowd_times::base_positions;
 
 const TASK: usize = 32;
@@ -130,17 +131,8 @@ fn matrices(
                     *matrix = transform(rotation, moved, scale);
                 }
             }
-            FrameStep::Walk => {
-                for link in &scene.library.links {
-                    let (joint, parent) = (link.joint as usize, link.parent as usize);
-                    matrices[joint] = affine_product(&matrices[parent], &matrices[joint]);
-                }
-            }
-            FrameStep::Skin => {
-                for (matrix, bind) in matrices.iter_mut().zip(&scene.library.bind) {
-                    *matrix = affine_product(matrix, bind);
-                }
-            }
+            FrameStep::Walk => stages::walk(&scene.library.links, matrices),
+            FrameStep::Skin => stages::skin(&scene.library.bind, matrices),
             // The caller rounds the result.
             FrameStep::Half => {}
         }

@@ -24,12 +24,13 @@ use crate::tracks::signs::Signs;
 /// let mut set = TrackSet::new();
 /// set.push("wheel", &[0.0, 2.0], &[Quat::IDENTITY, Quat::from_rotation_z(1.0)])?;
 /// let quantity = Quantity::Velocity(Axes::Body);
-/// let how = Interpolation { quantity, ..method::SLERP.into() };
+/// let how = Interpolation::new(method::SLERP).with_quantity(quantity);
 /// let found = Engine::new(Device::Cpu)?.rates(&set, how, &SampleTimes::fps(1), Layout::TrackMajor)?;
 /// assert!(found.get(0, 0).unwrap().distance(Vec3::Z * 0.5) < 1e-6);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[non_exhaustive]
 pub enum Quantity {
     /// The rotation, a unit quaternion.
     #[default]
@@ -79,6 +80,7 @@ impl FromStr for Quantity {
 
 /// The speed on a track's curve; no effect on [`STEP`](crate::method::step::STEP).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[non_exhaustive]
 pub enum Speed {
     /// According to the key times.
     #[default]
@@ -113,7 +115,7 @@ names! {
 }
 
 /// Which sign of each key is used: `q` and `-q` are the same rotation.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum KeySigns {
     /// Each key has the sign that is nearer to the key before it, so rotations between keys are at most 180°. Keys
     /// that are 180° apart keep their signs.
@@ -164,6 +166,7 @@ impl KeySigns {
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[doc(alias = "boundary condition")]
 #[doc(alias = "end condition")]
+#[non_exhaustive]
 pub enum Ends {
     /// The parabola through the last three keys at each end. Constant velocity stays constant up to the ends.
     #[default]

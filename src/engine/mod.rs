@@ -91,7 +91,7 @@ impl Engine {
     /// it differs from the CPU, that evaluation fails with
     /// [`VulkanError::InexactKernel`](crate::vulkan::VulkanError::InexactKernel).
     pub fn with_options(device: Device, options: &EngineOptions) -> Result<Self, Error> {
-        VectorWidth::limit()?;
+        VectorWidth::limit().map_err(Error::VectorWidth)?;
         match device {
             Device::Cpu => {
                 if let Some(requested) = options
@@ -226,7 +226,7 @@ impl Engine {
         Ok(self.machine.negative_control()?)
     }
 
-    /// The messages of the validation layer so far; see [`Device::list_with`].
+    /// The messages of the validation layer so far; see [`Device::list_validated`].
     #[must_use]
     pub fn validation_messages(&self) -> Vec<String> {
         self.machine.validation_messages()

@@ -7,6 +7,7 @@ use ash::vk::{self, Handle as _};
 
 use crate::machine::error::VulkanError;
 use crate::machine::error::calls::Named as _;
+use crate::names::fields::with_fields;
 use crate::threads::lock;
 
 /// An application's instance, device and queue, for an engine
@@ -14,6 +15,8 @@ use crate::threads::lock;
 ///
 /// No features of the device are required, but software devices are faster with one
 /// ([`VulkanHandles::shader_int64`]). With Vulkan 1.1, enable `VK_KHR_shader_float_controls` if the device has it.
+#[derive(Clone)]
+#[non_exhaustive]
 pub struct VulkanHandles {
     /// The loaded functions; they keep the loader library open.
     pub entry: ash::Entry,
@@ -58,7 +61,70 @@ pub struct VulkanHandles {
     pub pipeline_cache: Option<vk::PipelineCache>,
 }
 
+with_fields! {
+    VulkanHandles:
+    with_copy_queue(copy_queue: Option<VulkanQueue>),
+    with_queue_lock(queue_lock: Option<QueueLock>),
+    with_pipeline_cache(pipeline_cache: Option<vk::PipelineCache>),
+}
+
+impl fmt::Debug for VulkanHandles {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("VulkanHandles")
+            .field("api_version", &self.api_version)
+            .field("physical_device", &self.physical_device)
+            .field("queue", &self.queue)
+            .field("queue_family", &self.queue_family)
+            .finish_non_exhaustive()
+    }
+}
+
 impl VulkanHandles {
+    /// An instance, which was made for a Vulkan version (`VkApplicationInfo::apiVersion`), a device of it and a queue,
+    /// without optional features.
+    #[must_use]
+    pub fn new(
+        entry: ash::Entry,
+        instance: ash::Instance,
+        api_version: u32,
+        physical_device: vk::PhysicalDevice,
+        device: ash::Device,
+        queue: VulkanQueue,
+    ) -> Self {
+        Self {
+            entry,
+            instance,
+            api_version,
+            physical_device,
+            device,
+            shader_float_controls: false,
+            shader_int64: false,
+            queue: queue.queue,
+            queue_family: queue.family,
+            copy_queue: None,
+            queue_lock: None,
+            pipeline_cache: None,
+        }
+    }
+
+    /// `VK_KHR_shader_float_controls` is enabled on the device.
+    #[must_use]
+    pub fn with_shader_float_controls(self) -> Self {
+        Self {
+            shader_float_controls: true,
+            ..self
+        }
+    }
+
+    /// The feature `shaderInt64` is enabled on the device.
+    #[must_use]
+    pub fn with_shader_int64(self) -> Self {
+        Self {
+            shader_int64: true,
+            ..self
+        }
+    }
+
     /// Refuses handles that are null, and a version that is too old. Returns the version of which functions may be used.
     pub(crate) fn check(&self) -> Result<u32, VulkanError> {
         let handles = [
@@ -148,7 +214,8 @@ impl fmt::Debug for QueueLock {
 }
 
 /// A queue of an application's device.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub struct VulkanQueue {
     /// The queue.
     pub queue: vk::Queue,
@@ -156,8 +223,17 @@ pub struct VulkanQueue {
     pub family: u32,
 }
 
+impl VulkanQueue {
+    /// A queue of a family.
+    #[must_use]
+    pub fn new(queue: vk::Queue, family: u32) -> Self {
+        Self { queue, family }
+    }
+}
+
 /// A range of a buffer on an application's device.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub struct VulkanBuffer {
     /// The buffer.
     pub buffer: vk::Buffer,
@@ -168,6 +244,22 @@ pub struct VulkanBuffer {
 }
 
 impl VulkanBuffer {
+    /// The first `size` bytes of a buffer.
+    #[must_use]
+    pub fn new(buffer: vk::Buffer, size: u64) -> Self {
+        Self {
+            buffer,
+            offset: 0,
+            size,
+        }
+    }
+
+    /// A range of the same size that starts at another offset, bytes.
+    #[must_use]
+    pub fn at(self, offset: u64) -> Self {
+        Self { offset, ..self }
+    }
+
     /// Refuses a null buffer, and a range that ends beyond the buffer. Vulkan tells neither a buffer's length nor its
     /// usages; its memory is at least as long as the buffer.
     pub(crate) fn check(&self, device: &ash::Device) -> Result<(), VulkanError> {

@@ -11,6 +11,7 @@ use crate::gpu::device::{LogicalDevice, QueueLane};
 use crate::gpu::pipeline::Pipeline;
 use crate::machine::error::VulkanError;
 use crate::machine::error::calls::Named;
+use crate::names::fields::with_fields;
 use crate::shader::Kernel;
 use crate::work::recording::{Bytes, Recording, Resource, Slice, Step, Users};
 
@@ -162,7 +163,8 @@ fn found(memory: &[Binding], slice: &Slice) -> Binding {
 }
 
 /// Users of a device's memory among an application's commands.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[non_exhaustive]
 pub enum CommandUsers {
     /// All commands.
     #[default]
@@ -180,12 +182,19 @@ pub enum CommandUsers {
 /// The commands of an application that a recorded target is ordered with. The target waits for the earlier commands and
 /// their writes, and the later ones see its results. Waiting for fewer kinds of commands takes less time; by default the
 /// target waits for all commands, also for drawing.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[non_exhaustive]
 pub struct CommandScopes {
     /// The users before it of its inputs and of the memory of its result.
     pub before: CommandUsers,
     /// The users after it of its result.
     pub after: CommandUsers,
+}
+
+with_fields! {
+    CommandScopes:
+    with_before(before: CommandUsers),
+    with_after(after: CommandUsers),
 }
 
 impl CommandScopes {

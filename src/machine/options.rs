@@ -4,10 +4,12 @@ use std::ops::AddAssign;
 use std::path::PathBuf;
 use std::time::Duration;
 
+use crate::names::fields::with_fields;
 use crate::simd::dispatch::VectorWidth;
 
 /// How results of a Vulkan device reach the host's memory.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[non_exhaustive]
 pub enum Transfer {
     /// `InPlace` if the device shares the host's memory, otherwise `Staged`. Software devices write directly into the
     /// caller's memory if possible.
@@ -20,7 +22,8 @@ pub enum Transfer {
 }
 
 /// On which queue of a Vulkan device results are copied to the host, if they are copied ([`Transfer::Staged`]).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[non_exhaustive]
 pub enum ReadBack {
     /// [`ReadBack::Overlapped`] on cards that have a second queue, otherwise and on software devices
     /// [`ReadBack::SameQueue`].
@@ -35,7 +38,8 @@ pub enum ReadBack {
 }
 
 /// How keys, segments and work lists are transferred to a Vulkan device.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[non_exhaustive]
 pub enum Uploads {
     /// [`Uploads::Direct`] if the memory that is device-local and host-visible is as large as the device's memory
     /// (resizable BAR, integrated devices), or if the upload is at most a 64th of that memory. Otherwise as results
@@ -50,7 +54,8 @@ pub enum Uploads {
 }
 
 /// How kernels of a Vulkan device read keys, segments and work lists.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[non_exhaustive]
 pub enum Reads {
     /// Texel buffers on software devices that support them, otherwise storage buffers.
     #[default]
@@ -63,7 +68,8 @@ pub enum Reads {
 }
 
 /// How the samples of a result are distributed to the invocations of a kernel on a Vulkan device.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[non_exhaustive]
 pub enum Mapping {
     /// [`Mapping::Samples`] on graphics cards and integrated devices, [`Mapping::Runs`] on software
     /// devices.
@@ -78,7 +84,8 @@ pub enum Mapping {
 }
 
 /// Where the arcs of [`SLERP`](crate::method::SLERP) are prepared for a Vulkan device.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[non_exhaustive]
 pub enum PrepareArcs {
     /// On a discrete card for many keys, otherwise on the host.
     #[default]
@@ -94,6 +101,7 @@ pub enum PrepareArcs {
 /// (`pipelines-…`), the kernels that passed their check (`kernel-checks`), and the speed of each model of card
 /// (`probe-…`, for [`Engine::auto`](crate::engine::Engine::auto)). An engine reads and writes no other files.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
+#[non_exhaustive]
 pub enum CacheFiles {
     /// In the directory that the environment variable `TUMBLE_CACHE_DIR` names; if it is empty, nowhere. Without the
     /// variable, in `tumble` in the user's cache directory: `XDG_CACHE_HOME` or `~/.cache`, `~/Library/Caches` on
@@ -146,6 +154,22 @@ pub struct EngineOptions {
     pub cache_files: CacheFiles,
 }
 
+with_fields! {
+    EngineOptions:
+    with_memory(memory: Option<u64>),
+    with_kept_segments(kept_segments: Option<u64>),
+    with_thread_count(thread_count: Option<usize>),
+    with_vector_width(vector_width: Option<VectorWidth>),
+    with_transfer(transfer: Transfer),
+    with_read_back(read_back: ReadBack),
+    with_uploads(uploads: Uploads),
+    with_reads(reads: Reads),
+    with_mapping(mapping: Mapping),
+    with_prepare_arcs(prepare_arcs: PrepareArcs),
+    with_run_lanes(run_lanes: Option<RunLanes>),
+    with_cache_files(cache_files: CacheFiles),
+}
+
 /// How many neighbouring invocations of a graphics card evaluate a run of samples together, for runs of each class of
 /// lengths ([`RunLanes::CLASSES`]). Only powers of two from 4 to 32 are used: other numbers are as the next smaller one,
 /// or the nearest of these.
@@ -173,6 +197,7 @@ impl RunLanes {
 
 /// The times of a Vulkan device's evaluations ([`Engine::take_timings`](crate::engine::Engine::take_timings)).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
 pub struct Timings {
     /// Time in which the host made work lists and recorded commands. The device may have worked on another window at
     /// the same time.

@@ -41,6 +41,7 @@ pub struct DeviceInfo {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
+#[non_exhaustive]
 pub enum DeviceKind {
     /// A graphics card with its memory.
     Discrete,
@@ -70,6 +71,7 @@ pub struct SelfTestReport {
 /// result differs, it is not shown that the comparison can detect differences on this device.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[non_exhaustive]
 pub struct NegativeControl {
     /// For each expression, the number of results whose bits differ from the CPU's.
     pub expressions: Vec<SelfTestReport>,
@@ -95,6 +97,7 @@ impl NegativeControl {
 /// The result of the check of one kernel.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[non_exhaustive]
 pub struct KernelCheck {
     /// The kernel's name, as in [`kernels`](crate::vulkan::kernels).
     pub name: &'static str,

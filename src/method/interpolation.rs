@@ -7,6 +7,7 @@ use crate::curve::options::{
     Ends, InterpolationError, InterpolationWarning, KeySigns, Quantity, Speed,
 };
 use crate::method::{CurveKind, Method, MethodInput, SmoothCurves};
+use crate::names::fields::with_fields;
 use crate::reference::curve::ReferenceCurve;
 use crate::shader::Form;
 use crate::threads::on_threads;
@@ -24,25 +25,24 @@ use crate::tracks::set::{Track, TrackSet};
 /// let mut set = TrackSet::new();
 /// let keys = [0.0, 0.8, 2.0, 0.0].map(Quat::from_rotation_z);
 /// set.push("wheel", &[0.0, 1.0, 2.0, 4.0], &keys)?;
-/// let looped = Interpolation {
-///     ends: Ends::Loop,       // the last key repeats the first
-///     after: WrapMode::Loop,  // and behind it the track starts again
-///     signs: KeySigns::Shortest,
-///     speed: Speed::AsKeyed,
-///     ..Interpolation::from(method::CATMULL_ROM)
-/// };
+/// let looped = Interpolation::new(method::CATMULL_ROM)
+///     .with_ends(Ends::Loop)        // the last key repeats the first
+///     .with_after(WrapMode::Loop)   // and behind it the track starts again
+///     .with_signs(KeySigns::Shortest)
+///     .with_speed(Speed::AsKeyed);
 /// let engine = Engine::new(Device::Cpu)?;
 /// let found = engine.evaluate(&set, looped, &SampleTimes::at(vec![1.0, 5.0]))?;
 /// assert_eq!(found.get(0, 0), found.get(0, 1));
 ///
 /// // Kochanek-Bartels with a tension of 1 stands still at its keys.
 /// let tcb = Tcb { tension: 1.0, continuity: 0.0, bias: 0.0 };
-/// let still = Interpolation { tcb, ..Interpolation::from(method::KOCHANEK_BARTELS) };
+/// let still = Interpolation::new(method::KOCHANEK_BARTELS).with_tcb(tcb);
 /// let near = engine.evaluate(&set, still, &SampleTimes::at(vec![1.0, 1.001]))?;
 /// assert!(near.as_quats()[0].angle_between(near.as_quats()[1]) < 1e-3);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Interpolation {
     /// The method.
     pub method: Method,
@@ -63,7 +63,25 @@ pub struct Interpolation {
     pub after: WrapMode,
 }
 
+with_fields! {
+    Interpolation:
+    with_method(method: Method),
+    with_signs(signs: KeySigns),
+    with_ends(ends: Ends),
+    with_tcb(tcb: Tcb),
+    with_quantity(quantity: Quantity),
+    with_speed(speed: Speed),
+    with_before(before: WrapMode),
+    with_after(after: WrapMode),
+}
+
 impl Interpolation {
+    /// A method with its default options.
+    #[must_use]
+    pub fn new(method: Method) -> Self {
+        method.into()
+    }
+
     /// The form that the kernels evaluate.
     #[must_use]
     pub fn form(&self) -> Form {

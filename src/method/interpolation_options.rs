@@ -4,6 +4,7 @@ use crate::curve::options::{Ends, KeySigns, Quantity, Speed};
 use crate::method::Method;
 use crate::method::interpolation::Interpolation;
 use crate::names::UnknownNameError;
+use crate::names::fields::with_fields;
 use crate::time::wrap::WrapMode;
 use crate::tracks::set::key_data::Tcb;
 
@@ -11,11 +12,12 @@ use crate::tracks::set::key_data::Tcb;
 ///
 /// ```
 /// use tumble::{Ends, Interpolation, InterpolationOptions, Speed, method};
-/// let options = InterpolationOptions { speed: Speed::Constant, ..InterpolationOptions::default() };
+/// let options = InterpolationOptions::default().with_speed(Speed::Constant);
 /// assert_eq!(options.with(method::C2).ends, Ends::Secant); // the default of the method
 /// assert_eq!(InterpolationOptions::default().with(method::C2), Interpolation::from(method::C2));
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct InterpolationOptions {
     /// Which sign of each key is used; `None`: [`KeySigns::Shortest`]. [`GLTF_CUBIC`](crate::method::GLTF_CUBIC)
     /// ignores this option in tracks with tangents.
@@ -36,6 +38,7 @@ pub struct InterpolationOptions {
 
 /// The value of an option, as programs and bindings get it.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub enum OptionValue<'a> {
     /// The name of a value, or a number as text.
     Text(&'a str),
@@ -70,6 +73,7 @@ pub enum OptionValueError {
 
 /// An option by its name: how it is set in [`InterpolationOptions`], and its value there.
 #[derive(Clone, Copy)]
+#[non_exhaustive]
 pub struct InterpolationOption {
     /// The name that programs and bindings use.
     pub name: &'static str,
@@ -190,6 +194,17 @@ impl Default for InterpolationOptions {
     fn default() -> Self {
         Self::DEFAULT
     }
+}
+
+with_fields! {
+    InterpolationOptions:
+    with_signs(signs: Option<KeySigns>),
+    with_ends(ends: Option<Ends>),
+    with_tcb(tcb: Tcb),
+    with_quantity(quantity: Quantity),
+    with_speed(speed: Speed),
+    with_before(before: WrapMode),
+    with_after(after: WrapMode),
 }
 
 impl InterpolationOptions {

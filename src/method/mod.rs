@@ -250,6 +250,7 @@ impl SmoothCurves {
 /// The smoothness of a curve where its segments meet. Specified tangents, tension or continuity of keys may make it
 /// less smooth than its method.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[non_exhaustive]
 pub enum Continuity {
     /// The rotation jumps.
     Jumps,
@@ -275,6 +276,7 @@ impl fmt::Display for Continuity {
 /// The computing time of a method on one thread, nanoseconds, for comparisons between methods. Measured with `cargo
 /// bench` on a machine with AVX2, for steps up to 85°.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Cost {
     /// The time to prepare a key.
     pub key: f64,
@@ -290,6 +292,7 @@ impl Cost {
 
 /// The key times for which a property of a method holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub enum Keys {
     /// The property holds for no key times.
     Never,

@@ -5,6 +5,7 @@ use crate::tracks::per_track::PerTrack;
 
 /// A method of interpolation for vectors. Its ends are as those for rotations, but clamped ends are at rest.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[non_exhaustive]
 pub enum VectorMethod {
     /// The value of the key at or before the time.
     Step,
@@ -43,6 +44,7 @@ impl From<VectorMethod> for PerTrack<VectorMethod> {
 
 /// The quantity evaluated of a scalar or a vector.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[non_exhaustive]
 pub enum ScalarQuantity {
     /// The number itself.
     #[default]

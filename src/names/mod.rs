@@ -1,5 +1,7 @@
 //! The names of options' values: one list for each option, which programs and bindings read, write and print.
 
+pub(crate) mod fields;
+
 /// No value of an option has this name.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("there is no {option} `{name}`; there are {}{}", known.join(", "), hint(name, known))]

@@ -4,6 +4,7 @@ use crate::names::names;
 
 /// The values that are stored for every joint of every instance, `[instance][joint]`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub enum CrowdValues {
     /// The rotation in the parent's frame, `x y z w`.
     Rotations,
@@ -26,6 +27,7 @@ names! {
 
 /// The values that a crowd's evaluation stores, and their precision.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub struct CrowdOutput {
     /// The values of every joint.
     pub values: CrowdValues,

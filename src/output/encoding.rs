@@ -8,6 +8,7 @@ use std::str::FromStr;
 use glam::{Mat3, Quat};
 
 use crate::math::quaternion::about;
+use crate::names::fields::with_fields;
 use crate::names::{UnknownNameError, named, names};
 use crate::output::component_type::ComponentType;
 use crate::output::euler::EulerSequence;
@@ -276,7 +277,7 @@ representations! {
 ///
 /// ```
 /// use tumble::{Encoding, EncodingOptions, MatrixOrder};
-/// let options = EncodingOptions { order: MatrixOrder::ColumnMajor, sequence: "ZXY".parse()? };
+/// let options = EncodingOptions::default().with_order(MatrixOrder::ColumnMajor).with_sequence("ZXY".parse()?);
 /// let matrices = Encoding::ALL.into_iter().find(|kind| kind.name() == "matrix").unwrap();
 /// let columns = matrices.with(options);
 /// let mut bytes = vec![0; columns.bytes()];
@@ -285,11 +286,28 @@ representations! {
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub struct EncodingOptions {
     /// The order of matrix elements in memory.
     pub order: MatrixOrder,
     /// The axes of Euler angles.
     pub sequence: EulerSequence,
+}
+
+with_fields! {
+    EncodingOptions:
+    with_order(order: MatrixOrder),
+    with_sequence(sequence: EulerSequence),
+}
+
+impl Default for EncodingOptions {
+    /// Matrices row by row, and Euler angles XYZ.
+    fn default() -> Self {
+        Self {
+            order: MatrixOrder::RowMajor,
+            sequence: EulerSequence::XYZ,
+        }
+    }
 }
 
 /// The length of memory does not fit the number of rotations.

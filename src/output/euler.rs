@@ -119,6 +119,7 @@ impl fmt::Display for EulerSequence {
 #[error(
     "`{name}` is not a sequence of Euler angles; give three axes, no two neighbours the same: XYZ, ZXZ … for intrinsic angles, xyz, zxz … for extrinsic ones"
 )]
+#[non_exhaustive]
 pub struct EulerSequenceError {
     /// The text.
     pub name: String,

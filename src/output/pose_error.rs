@@ -118,6 +118,7 @@ pub enum PoseError {
 
 /// An operand of a pass over poses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum PassOperand {
     /// An input, by its index in the order of the pass's fields.
     Input(usize),

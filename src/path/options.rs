@@ -4,6 +4,7 @@ use glam::{DQuat, DVec3};
 
 use crate::curve::options::Ends;
 use crate::method::vector_method::VectorMethod;
+use crate::names::fields::with_fields;
 use crate::names::names;
 use crate::path::speed::PathSpeed;
 use crate::threads::stop::StoppedError;
@@ -17,19 +18,18 @@ use crate::threads::stop::StoppedError;
 /// let mut set = TrackSet::new();
 /// let road = [[0.0, 0.0, 0.0], [4.0, 0.0, 1.0], [8.0, 1.0, 0.0]];
 /// set.push_path("car", &[0.0, 1.0, 3.0], &road, &[])?;
-/// let follow = Follow {
-///     speed: PathSpeed::Eased { start: 0.2, end: 0.2 },
-///     direction: Direction::Point(DVec3::new(4.0, 3.0, 0.0)),
-///     frame: PathFrame::Fixed,
-///     axes: ["z".parse()?, "y".parse()?],
-///     ..Follow::default()
-/// };
+/// let follow = Follow::default()
+///     .with_speed(PathSpeed::Eased { start: 0.2, end: 0.2 })
+///     .with_direction(Direction::Point(DVec3::new(4.0, 3.0, 0.0)))
+///     .with_frame(PathFrame::Fixed)
+///     .with_axes(["z".parse()?, "y".parse()?]);
 /// let engine = Engine::new(Device::Cpu)?;
 /// let found = engine.follow(&set, &follow, &SampleTimes::fps(30), Layout::TrackMajor)?;
 /// assert_eq!(found.positions.get(0, 0), Some(Vec3::ZERO));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Follow {
     /// The curve through the points.
     pub method: VectorMethod,
@@ -67,9 +67,22 @@ impl Default for Follow {
     }
 }
 
+with_fields! {
+    Follow:
+    with_method(method: VectorMethod),
+    with_ends(ends: Ends),
+    with_direction(direction: Direction),
+    with_frame(frame: PathFrame),
+    with_up(up: DVec3),
+    with_twist(twist: Twist),
+    with_speed(speed: PathSpeed),
+    with_axes(axes: [BodyAxis; 2]),
+}
+
 /// The direction in which a body on a path faces. A body that stands still keeps its last direction; at the start it
 /// has the first direction that follows.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[non_exhaustive]
 pub enum Direction {
     /// Along the path.
     #[default]
@@ -85,6 +98,7 @@ pub enum Direction {
 
 /// The rotation of a body about its direction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[non_exhaustive]
 pub enum PathFrame {
     /// The body does not rotate about its direction (Bishop 1975; Wang et al. 2008).
     #[default]
@@ -133,7 +147,9 @@ impl std::str::FromStr for BodyAxis {
             _ => name,
         };
         let found = Self::ALL.into_iter().find(|axis| axis.name() == name);
-        found.ok_or(FollowError::Axes)
+        found.ok_or_else(|| FollowError::UnknownAxis {
+            name: name.to_owned(),
+        })
     }
 }
 
@@ -292,6 +308,12 @@ pub enum FollowError {
     /// The forward and the upward axis are not different axes.
     #[error("a body's forward and upward axes must be two different ones of x, y, z, -x, -y, -z")]
     Axes,
+    /// No axis of a body has this name.
+    #[error("there is no axis `{name}`; there are x, y, z, -x, -y, -z")]
+    UnknownAxis {
+        /// The text.
+        name: String,
+    },
 }
 
 /// A warning about a path that is followed nevertheless.

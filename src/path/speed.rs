@@ -2,6 +2,7 @@
 
 /// The speed of a body on its path.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[non_exhaustive]
 pub enum PathSpeed {
     /// According to the key times.
     #[default]

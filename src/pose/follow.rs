@@ -11,6 +11,7 @@ use crate::tracks::set::TrackSet;
 
 /// The positions and rotations of the bodies on a set's paths at every sample.
 #[derive(Debug)]
+#[non_exhaustive]
 pub struct Followed {
     /// Positions.
     pub positions: Vectors,

@@ -45,6 +45,14 @@ pub struct ReferenceCurve {
     lengths: Option<CurveLengths>,
 }
 
+impl fmt::Debug for ReferenceCurve {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("ReferenceCurve")
+            .field("segment_count", &self.segments.len())
+            .finish_non_exhaustive()
+    }
+}
+
 impl ReferenceCurve {
     /// Makes the curve through (or near) `keys` at `times` (seconds), for keys without additional data. Keys are
     /// normalised in f64. With [`Ends::Loop`], the last key must equal the first.

@@ -26,7 +26,7 @@ pub enum FollowerDirection {
 }
 
 /// The rotation of the body about its direction.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum FollowerFrame {
     /// The body does not rotate about its direction.
     Minimal,

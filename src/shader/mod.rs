@@ -22,6 +22,7 @@ pub(crate) const POWERS: usize = 11;
 
 /// The form of the curve that a kernel evaluates. Many methods share one form.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub enum Form {
     /// A great circle at constant angular velocity.
     Arc,

@@ -21,6 +21,7 @@ use crate::simd::sixteen::Sixteen;
 
 /// Vector instructions of the CPU engine.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[non_exhaustive]
 pub enum VectorWidth {
     /// The instructions that every processor of the target has: SSE2 on x86-64, NEON on `AArch64`.
     Baseline,

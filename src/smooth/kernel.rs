@@ -3,10 +3,12 @@
 use std::fmt;
 use std::str::FromStr;
 
+use crate::names::fields::with_fields;
 use crate::names::names;
 
 /// Options for smoothing samples ([`Engine::smooth`](crate::engine::Engine::smooth)).
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Smoothing {
     /// The weights.
     pub kernel: SmoothingKernel,
@@ -16,9 +18,17 @@ pub struct Smoothing {
     pub passes: u32,
 }
 
+with_fields! {
+    Smoothing:
+    with_kernel(kernel: SmoothingKernel),
+    with_ends(ends: SmoothingEnds),
+    with_passes(passes: u32),
+}
+
 /// The weights of a sample and its neighbours. Each weight is the integral of a function over the neighbour's cell,
 /// from half a sample before the neighbour to half a sample after it.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub enum SmoothingKernel {
     /// ¼, ½, ¼.
     Linear,
@@ -43,6 +53,7 @@ pub enum SmoothingKernel {
 
 /// The assumed values before the first and after the last sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[non_exhaustive]
 pub enum SmoothingEnds {
     /// The steps are mirrored, so that the first and the last sample stay unchanged.
     #[default]

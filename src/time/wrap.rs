@@ -17,6 +17,7 @@ use crate::time::moment::{InCopy, Moment, Period};
 #[doc(alias = "post-infinity")]
 #[doc(alias = "extrapolation")]
 #[doc(alias = "loop")]
+#[non_exhaustive]
 pub enum WrapMode {
     /// The end value is held.
     #[default]

@@ -29,6 +29,7 @@ pub enum PerTrack<T> {
 
 /// The tracks of a set that have equal values.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct TrackGroup<T> {
     /// Their value.
     pub value: T,
@@ -41,6 +42,7 @@ pub struct TrackGroup<T> {
 #[error(
     "a list of {values} is given for {tracks} tracks; give one for each track, or a single one for all"
 )]
+#[non_exhaustive]
 pub struct PerTrackCountError {
     /// The number of values.
     pub values: usize,

@@ -54,20 +54,31 @@ pub struct Comparison {
 pub enum Agreement {
     /// The bits are the engine's, and the errors are within the bounds.
     SameBits,
-    /// Some bits differ from the engine's, but the errors against the f64 reference are within the engine's bounds.
+    /// Some bits differ, but the errors are within the bounds: those of the engine against the f64 reference, or those
+    /// that the caller gave.
     WithinBounds,
-    /// There were no rotations, so nothing was compared.
+    /// There was nothing to compare, or nothing was written ([`UNWRITTEN`](crate::verify::UNWRITTEN)).
     Nothing,
     /// An error exceeds its bound, or a number is NaN.
     OutsideBounds,
 }
 
 impl Comparison {
-    /// The agreement that these numbers show.
+    /// The agreement that these numbers show, with the bounds that the engine must meet.
     #[must_use]
     pub fn agreement(&self) -> Agreement {
-        let is_within_bounds =
-            self.max_error <= self.error_bound && self.max_norm_error <= self.norm_bound;
+        self.judged(self.error_bound, self.norm_bound)
+    }
+
+    /// The agreement with a bound of your choice for the angle to the reference, radians. Norms may differ from 1 by as
+    /// much, or by as much as the engine's.
+    #[must_use]
+    pub fn agreement_within(&self, radians: f64) -> Agreement {
+        self.judged(radians, self.norm_bound.max(radians))
+    }
+
+    fn judged(&self, error_bound: f64, norm_bound: f64) -> Agreement {
+        let is_within_bounds = self.max_error <= error_bound && self.max_norm_error <= norm_bound;
         match self.differing {
             _ if self.rotations == 0 => Agreement::Nothing,
             _ if !is_within_bounds => Agreement::OutsideBounds,

@@ -34,6 +34,7 @@ const JOINTS: usize = 60;
 /// Measured speeds. Rates are bytes per second. Each figure is the median of several runs after a run that is
 /// ignored.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
+#[non_exhaustive]
 pub struct Figures {
     /// The clock of the rates and of [`FigureCase::seconds`]: `device` if the device has time stamps, else `host`.
     pub clock: &'static str,
@@ -55,6 +56,7 @@ pub struct Figures {
 
 /// One case of the engine.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
+#[non_exhaustive]
 pub struct FigureCase {
     /// `resident`, `read-back`, `crowd` or `encoded`.
     pub case: &'static str,

@@ -63,6 +63,7 @@ pub enum GoldenError {
 
 /// The result of a case on an engine.
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct GoldenResult {
     /// The first 64 bits of the SHA-256 of all bytes, in hexadecimal digits.
     pub hash: String,

@@ -4,6 +4,7 @@
 
 #[cfg(feature = "prove")]
 mod application;
+mod buffers;
 mod comparison;
 #[cfg(feature = "prove")]
 pub mod figures;
@@ -21,6 +22,10 @@ pub mod resident;
 #[cfg(feature = "golden")]
 pub(crate) mod sets;
 
+pub use crate::verify::buffers::{
+    BufferComparison, BufferLengthError, DifferenceKind, UNWRITTEN, WordBound, WordDifference,
+    WordType, compare_buffers,
+};
 pub use crate::verify::comparison::{Agreement, Comparison, compare};
 pub use crate::verify::outputs::OutputVerification;
 use bytemuck::NoUninit;
@@ -89,6 +94,7 @@ pub struct Verification {
 /// The location of a rotation in a result.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[non_exhaustive]
 pub struct SamplePosition {
     /// The index of the track in the set.
     pub track: usize,

@@ -28,6 +28,7 @@ use crate::verify::sets::{
 
 /// The result of a round.
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct RandomRound {
     /// The evaluation, in words.
     pub description: String,

@@ -31,6 +31,7 @@ pub struct Resident<'a> {
 
 /// The time of one evaluation whose result stayed on the device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct ResidentTime {
     /// The time by the device's clock.
     pub on_device: Duration,

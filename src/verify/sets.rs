@@ -3,7 +3,7 @@
 
 use glam::{Affine3A, DVec3, Mat3A, Quat, Vec3};
 
-use crate::crowd::layer::CrowdLayer;
+use crate::crowd::layer::{CrowdLayer, LayerBlend};
 use crate::crowd::library::CrowdLibrary;
 use crate::crowd_error::CrowdError;
 use crate::method::Method;
@@ -406,7 +406,7 @@ pub(crate) fn typical_layer(random: &mut SeededRandom, library: &CrowdLibrary) -
         speed: random.pick(&[0.9, 1.0, 1.0, 1.1]),
         wrap: WrapMode::Loop,
         weight: 1.0,
-        additive: false,
+        blend: LayerBlend::Over,
         mask: None,
     }
 }
@@ -419,7 +419,10 @@ pub(crate) fn crowd_layer(random: &mut SeededRandom, library: &CrowdLibrary) -> 
         speed: random.pick(&[0.0, 1.0, 1.0, -1.0, 0.37, -2.25, 100.0]),
         wrap: random.pick(&[WrapMode::Hold, WrapMode::Loop, WrapMode::Mirror]),
         weight: random.pick(&[0.0, 1.0, 0.25, 0.7]),
-        additive: random.next().is_multiple_of(2),
+        blend: match random.next().is_multiple_of(2) {
+            true => LayerBlend::Additive,
+            false => LayerBlend::Over,
+        },
         mask: random.pick(&[None, Some(0), Some(1)]),
     }
 }

@@ -42,11 +42,7 @@ fn assert_frames_are_recorded(mapping: Mapping) {
         let buffers = [0; FRAMES].map(|_| application.buffer(offset + size));
         let targets: Vec<CrowdTarget> = (buffers.iter())
             .map(|&(buffer, _)| {
-                let slice = |offset, size| VulkanBuffer {
-                    buffer,
-                    offset,
-                    size,
-                };
+                let slice = |offset, size| VulkanBuffer::new(buffer, size).at(offset);
                 // SAFETY: the buffer is as it must be, and outlives the target.
                 unsafe {
                     let small = crowd.target(output, slice(offset, size - 1)).unwrap_err();
@@ -117,11 +113,7 @@ fn thrown_away_frames_are_told() {
     let mut crowd = engine.crowd(&library, 5, 1).unwrap();
     let size = 5 * 3 * 16;
     let (buffer, memory) = application.buffer(size);
-    let range = VulkanBuffer {
-        buffer,
-        offset: 0,
-        size,
-    };
+    let range = VulkanBuffer::new(buffer, size);
     // SAFETY: the buffer is as it must be, and outlives the target.
     let target = unsafe { crowd.target(CrowdValues::Rotations, range) }.unwrap();
     let commands = Commands::new(&application);
@@ -188,11 +180,7 @@ fn assert_visible_instances_are_recorded(mapping: Mapping) {
         let each = 7 * output.bytes();
         let size = (ROOM * each) as u64;
         let (buffer, memory) = application.buffer(size);
-        let range = VulkanBuffer {
-            buffer,
-            offset: 0,
-            size,
-        };
+        let range = VulkanBuffer::new(buffer, size);
         // SAFETY: the buffer is as it must be, and outlives the target.
         let refused = unsafe { crowd.target(output, range) }.unwrap_err();
         assert!(matches!(refused, CrowdError::Buffer { .. }));

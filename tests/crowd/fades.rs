@@ -21,12 +21,9 @@ fn set_up(crowd: &mut Crowd, plays: &[CrowdLayer]) {
         let (ticks, to) = (instance as u64 * 9_973, [1.0, 0.0, 0.37][instance % 3]);
         crowd.fade(instance, 1, to, ticks).unwrap();
         // One that has begun, or will begin.
-        let fade = CrowdFade {
-            from: 0.25,
-            to: 1.0,
-            start: crowd.clock() + TENTH * (instance as u64 % 7) - 2 * TENTH,
-            ticks: 3 * TENTH + 1,
-        };
+        let fade = CrowdFade::new(0.25, 1.0)
+            .with_start(crowd.clock() + TENTH * (instance as u64 % 7) - 2 * TENTH)
+            .with_ticks(3 * TENTH + 1);
         if !instance.is_multiple_of(5) {
             crowd.set_fade(instance, 2, fade).unwrap();
         }
@@ -84,10 +81,7 @@ fn a_jump_and_many_steps_fade_alike() {
 fn both_ends_of_a_fade_are_exact() {
     let mut random = Random(43);
     let library = library(&mut random, 9, &SOME[..2]);
-    let play = |clip| CrowdLayer {
-        wrap: WrapMode::Hold,
-        ..CrowdLayer::new(clip).at(100_000)
-    };
+    let play = |clip| CrowdLayer::new(clip).at(100_000).with_wrap(WrapMode::Hold);
     for (name, mut crowd) in crowds(&library, 2, 2) {
         // The second instance plays each clip alone.
         let alone = |crowd: &mut Crowd, clip| {
@@ -96,16 +90,7 @@ fn both_ends_of_a_fade_are_exact() {
             evaluated(crowd, CrowdValues::Rotations)[9..].to_vec()
         };
         crowd.set(0, 0, play(0)).unwrap();
-        crowd
-            .set(
-                0,
-                1,
-                CrowdLayer {
-                    weight: 0.0,
-                    ..play(1)
-                },
-            )
-            .unwrap();
+        crowd.set(0, 1, play(1).with_weight(0.0)).unwrap();
         crowd.fade(0, 1, 1.0, 1000).unwrap();
         let lower = alone(&mut crowd, 0);
         let started = evaluated(&mut crowd, CrowdValues::Rotations)[..9].to_vec();
@@ -154,10 +139,7 @@ fn fades_take_over_from_each_other() {
     crowd.advance_ticks(400).unwrap();
     crowd.fade(0, 1, 0.0, 200).unwrap();
     crowd.set_weight(1, 1, 0.125).unwrap();
-    let plays = CrowdLayer {
-        weight: 0.75,
-        ..CrowdLayer::new(0)
-    };
+    let plays = CrowdLayer::new(0).with_weight(0.75);
     crowd.set_all(&[(2, 1, plays)]).unwrap();
     let weights = |crowd: &Crowd| [0, 1, 2, 3].map(|instance| weight(crowd, instance));
     assert_eq!(weights(&crowd), [0.5, 0.125, 0.75, 0.5]);
@@ -169,12 +151,7 @@ fn fades_take_over_from_each_other() {
     crowd.set_clock(0).unwrap();
     assert_eq!(weights(&crowd), [0.5, 0.125, 0.75, 0.0]);
     assert_eq!(crowd.get_fade(1, 1).unwrap(), None);
-    let expected = CrowdFade {
-        from: 0.5,
-        to: 0.0,
-        start: 400,
-        ticks: 200,
-    };
+    let expected = CrowdFade::new(0.5, 0.0).with_start(400).with_ticks(200);
     assert_eq!(crowd.get_fade(0, 1).unwrap(), Some(expected));
 }
 
@@ -186,10 +163,7 @@ fn a_saved_crowd_fades_on_as_before() {
     let mut crowd = cpu().crowd(&library, INSTANCES, LAYERS).unwrap();
     crowd.set_clock(5 * TENTH).unwrap();
     let plays: Vec<CrowdLayer> = (0..INSTANCES * LAYERS)
-        .map(|_| CrowdLayer {
-            speed: 1.0,
-            ..layer(&mut random, &library)
-        })
+        .map(|_| layer(&mut random, &library).with_speed(1.0))
         .collect();
     set_up(&mut crowd, &plays);
     crowd.advance(0.123).unwrap();
@@ -230,12 +204,7 @@ fn weights_that_cannot_be_are_refused() {
         let is_weight = |refused: Result<(), CrowdError>| matches!(refused, Err(CrowdError::Weight { weight: found }) if found.to_bits() == weight.to_bits());
         assert!(is_weight(crowd.set_weight(1, 1, weight)));
         assert!(is_weight(crowd.fade(1, 1, weight, 5)));
-        let fade = CrowdFade {
-            from: weight,
-            to: 1.0,
-            start: 0,
-            ticks: 9,
-        };
+        let fade = CrowdFade::new(weight, 1.0).with_start(0).with_ticks(9);
         assert!(is_weight(crowd.set_fade(1, 1, fade)));
     }
     let missing = |subject, index| CrowdError::Missing {

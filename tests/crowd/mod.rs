@@ -9,7 +9,9 @@ mod visible;
 
 use glam::{Affine3A, Quat, Vec3};
 use proptest::prelude::*;
-use tumble::crowd::{Crowd, CrowdError, CrowdLayer, CrowdLibrary, CrowdOutput, CrowdValues};
+use tumble::crowd::{
+    Crowd, CrowdError, CrowdLayer, CrowdLibrary, CrowdOutput, CrowdValues, LayerBlend,
+};
 use tumble::vulkan::tuning::{Mapping, Transfer};
 use tumble::{
     Device, Engine, EngineOptions, JointMatchError, Layout, METHODS, Method, SampleTimes, Skeleton,
@@ -127,10 +129,7 @@ fn every_tick_is_the_engines_frame() {
             let count = period as usize;
             let mut crowd = cpu().crowd(&library, count, 1).unwrap();
             for tick in 0..count {
-                let still = CrowdLayer {
-                    speed: 0.0,
-                    ..CrowdLayer::new(0)
-                };
+                let still = CrowdLayer::new(0).with_speed(0.0);
                 crowd.set(tick, 0, still.at(tick as i64)).unwrap();
             }
             let frames = SampleTimes::fps(TICKS);
@@ -191,15 +190,16 @@ pub(crate) fn library(random: &mut Random, joints: usize, methods: &[Method]) ->
 
 pub(crate) fn layer(random: &mut Random, library: &CrowdLibrary) -> CrowdLayer {
     let clip = (random.next() % library.clip_count() as u64) as usize;
-    CrowdLayer {
-        clip,
-        time: random.between(-3e6, 3e6) as i64,
-        speed: random.pick(&[0.0, 1.0, 1.0, -1.0, 0.37, -2.25, 100.0]),
-        wrap: random.pick(&[WrapMode::Hold, WrapMode::Loop, WrapMode::Mirror]),
-        weight: random.pick(&[0.0, 1.0, 0.25, 0.7]),
-        additive: random.next().is_multiple_of(2),
-        mask: random.pick(&[None, Some(0), Some(1)]),
-    }
+    CrowdLayer::new(clip)
+        .at(random.between(-3e6, 3e6) as i64)
+        .with_speed(random.pick(&[0.0, 1.0, 1.0, -1.0, 0.37, -2.25, 100.0]))
+        .with_wrap(random.pick(&[WrapMode::Hold, WrapMode::Loop, WrapMode::Mirror]))
+        .with_weight(random.pick(&[0.0, 1.0, 0.25, 0.7]))
+        .with_blend(match random.next().is_multiple_of(2) {
+            true => LayerBlend::Additive,
+            false => LayerBlend::Over,
+        })
+        .with_mask(random.pick(&[None, Some(0), Some(1)]))
 }
 
 /// Crowds on the CPU at every width and on every Vulkan device, there with a kernel for each step and with one for
@@ -373,14 +373,7 @@ fn instances_that_are_too_large_for_a_workgroup_have_the_same_bits() {
             .map(|(instance, layer)| {
                 let time = random.between(0.0, 1e6) as i64;
                 let plays = CrowdLayer::new(0).at(time);
-                (
-                    instance,
-                    layer,
-                    CrowdLayer {
-                        weight: 0.6,
-                        ..plays
-                    },
-                )
+                (instance, layer, plays.with_weight(0.6))
             })
             .collect();
         let mut expected = Vec::new();
@@ -440,11 +433,10 @@ fn a_day_later_the_bits_are_those_of_the_first_second() {
     let whole = day.div_ceil(period) * period;
     for (_, mut crowd) in crowds(&library, 40, 1) {
         for instance in 0..40 {
-            let plays = CrowdLayer {
-                speed: random.pick(&[1.0, -1.0, 2.0]),
-                wrap: WrapMode::Loop,
-                ..CrowdLayer::new(0).at(instance as i64 * 12_345)
-            };
+            let plays = CrowdLayer::new(0)
+                .at(instance as i64 * 12_345)
+                .with_speed(random.pick(&[1.0, -1.0, 2.0]))
+                .with_wrap(WrapMode::Loop);
             crowd.set(instance, 0, plays).unwrap();
         }
         crowd.set_clock(4_321).unwrap();
@@ -507,10 +499,10 @@ fn layers_are_mixed_and_added_as_poses_are() {
     }
     let engine = cpu();
     let mut crowd = engine.crowd(&library, 1, 2).unwrap();
-    let still = |clip| CrowdLayer {
-        speed: 0.0,
-        wrap: WrapMode::Hold,
-        ..CrowdLayer::new(clip)
+    let still = |clip| {
+        CrowdLayer::new(clip)
+            .with_speed(0.0)
+            .with_wrap(WrapMode::Hold)
     };
     let sources = [0, 1].map(|clip| {
         crowd.set(0, 0, still(clip).at(300_000)).unwrap();
@@ -533,18 +525,12 @@ fn layers_are_mixed_and_added_as_poses_are() {
     let [below, above] = [&sources[0], &sources[1]].map(|values| rotations(values));
     crowd.set(0, 0, still(0).at(300_000)).unwrap();
     for weight in [0.25, 0.5, 1.0] {
-        let over = CrowdLayer {
-            weight,
-            ..still(1).at(300_000)
-        };
+        let over = still(1).at(300_000).with_weight(weight);
         crowd.set(0, 1, over).unwrap();
         let expected = engine.mix(&below, &above, weight).unwrap();
         let found = evaluated(&mut crowd, CrowdValues::Rotations);
         assert_eq!(bits(&found), bits(expected.as_arrays()));
-        let additive = CrowdLayer {
-            additive: true,
-            ..over
-        };
+        let additive = over.with_blend(LayerBlend::Additive);
         crowd.set(0, 1, additive).unwrap();
         let expected = engine
             .add(&below, &above, &quats(&reference), weight)
@@ -552,6 +538,41 @@ fn layers_are_mixed_and_added_as_poses_are() {
         let found = evaluated(&mut crowd, CrowdValues::Rotations);
         assert_eq!(bits(&found), bits(expected.as_arrays()));
     }
+}
+
+/// A game may change the local transforms between the stages; where it changes nothing, the bits are those of a crowd that
+/// evaluates all stages at once.
+#[test]
+fn stages_have_the_bits_of_the_whole() {
+    let mut random = Random(31);
+    let library = library(&mut random, 13, &[method::SLERP, method::BESSEL_OVERHAUSER]);
+    let mut crowd = cpu().crowd(&library, 37, 2).unwrap();
+    for entry in 0..2 * 37 {
+        let plays = layer(&mut random, &library);
+        crowd.set(entry / 2, entry % 2, plays).unwrap();
+    }
+    let mut poses = evaluated(&mut crowd, CrowdValues::Local);
+    // In parts, as several threads do it.
+    let (front, back) = poses.split_at_mut(3 * 13 * 20);
+    for part in [front, back, &mut []] {
+        library.local_to_model(part).unwrap();
+    }
+    let expected = evaluated(&mut crowd, CrowdValues::Model);
+    assert_eq!(bits(&poses), bits(&expected));
+    library.model_to_skinning(&mut poses).unwrap();
+    let expected = evaluated(&mut crowd, CrowdValues::Skinning);
+    assert_eq!(bits(&poses), bits(&expected));
+    let refused = library.local_to_model(&mut [[0.0; 4]; 40]).unwrap_err();
+    assert_eq!(
+        refused,
+        CrowdError::PartOfPose {
+            length: 40,
+            each: 39
+        }
+    );
+    let unbound = CrowdLibrary::new(&skeleton(&mut random, 2)).unwrap();
+    let refused = unbound.model_to_skinning(&mut [[0.0; 4]; 6]).unwrap_err();
+    assert_eq!(refused, CrowdError::NoInverseBind);
 }
 
 /// Clips whose tracks are in another order have the same bits, and clips of other joints are refused, without a change
@@ -638,7 +659,7 @@ proptest! {
         crowd.set_clock(clock).unwrap();
         for (instance, time) in [time, time + 2 * periods * period].into_iter().enumerate() {
             for wrap in [WrapMode::Loop, WrapMode::Mirror] {
-                let plays = CrowdLayer { speed, wrap, ..CrowdLayer::new(0).at(time) };
+                let plays = CrowdLayer::new(0).at(time).with_speed(speed).with_wrap(wrap);
                 crowd.set(instance, 0, plays).unwrap();
             }
         }

@@ -54,10 +54,8 @@ fn libraries_refuse_what_does_not_fit() {
     );
     let refused = library.push(&one(1e6), method::SLERP, linear).unwrap_err();
     assert!(matches!(refused, CrowdError::TooLong { .. }), "{refused}");
-    let velocity = Interpolation {
-        quantity: Quantity::Velocity(Axes::Parent),
-        ..method::SLERP.into()
-    };
+    let velocity =
+        Interpolation::from(method::SLERP).with_quantity(Quantity::Velocity(Axes::Parent));
     let refused = library.push(&one(1.0), velocity, linear).unwrap_err();
     assert_eq!(refused, CrowdError::NotRotations);
     let mut wild = TrackSet::new();
@@ -108,8 +106,8 @@ fn crowds_refuse_what_is_not_there_and_stay_as_they_were() {
     crowd.set(1, 1, CrowdLayer::new(0)).unwrap();
     let before = bits(&evaluated(&mut crowd, CrowdValues::Skinning));
     let plays = CrowdLayer::new(0);
-    let at_speed = |speed| CrowdLayer { speed, ..plays };
-    let weighing = |weight| CrowdLayer { weight, ..plays };
+    let at_speed = |speed| plays.with_speed(speed);
+    let weighing = |weight| plays.with_weight(weight);
     let mask = Some(7);
     let wrap = WrapMode::Extrapolate;
     let hostile = [
@@ -120,8 +118,8 @@ fn crowds_refuse_what_is_not_there_and_stay_as_they_were() {
         ("weight", weighing(f32::NAN)),
         ("weight", weighing(-0.1)),
         ("weight", weighing(1.1)),
-        ("mask", CrowdLayer { mask, ..plays }),
-        ("wrap", CrowdLayer { wrap, ..plays }),
+        ("mask", plays.with_mask(mask)),
+        ("wrap", plays.with_wrap(wrap)),
     ];
     for (expected, plays) in hostile {
         let reason = crowd.set(1, 1, plays).unwrap_err();

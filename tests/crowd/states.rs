@@ -113,11 +113,10 @@ fn rotations_are_a_crowds_on_every_device_and_at_every_width() {
             let engine = Engine::new(device).unwrap();
             let mut crowd = engine.crowd(&library, at.len(), 1).unwrap();
             for (instance, &(clip, tick)) in at.iter().enumerate() {
-                let layer = CrowdLayer {
-                    speed: 0.0,
-                    wrap: WrapMode::Hold,
-                    ..CrowdLayer::new(clip as usize).at(tick.into())
-                };
+                let layer = CrowdLayer::new(clip as usize)
+                    .at(tick.into())
+                    .with_speed(0.0)
+                    .with_wrap(WrapMode::Hold);
                 crowd.set(instance, 0, layer).unwrap();
             }
             let mut found = vec![[0.0; 4]; at.len() * 11];

@@ -65,32 +65,30 @@ fn widths() -> Vec<Engine> {
 }
 
 fn follow_of(follower: &Follower) -> Follow {
-    Follow {
-        method: follower.curve.method.parse().unwrap(),
-        ends: follower.curve.ends,
-        direction: match follower.heading {
+    Follow::default()
+        .with_method(follower.curve.method.parse().unwrap())
+        .with_ends(follower.curve.ends)
+        .with_direction(match follower.heading {
             FollowerDirection::Tangent => Direction::Tangent,
             FollowerDirection::Ahead(distance) => Direction::Ahead(distance),
             FollowerDirection::At(point) => Direction::Point(point),
-        },
-        frame: match follower.frame {
+        })
+        .with_frame(match follower.frame {
             reference::FollowerFrame::Minimal => PathFrame::Minimal,
             reference::FollowerFrame::Fixed => PathFrame::Fixed,
             reference::FollowerFrame::Frenet => PathFrame::Frenet,
-        },
-        up: follower.up,
-        twist: if follower.spread {
+        })
+        .with_up(follower.up)
+        .with_twist(if follower.spread {
             Twist::Spread
         } else {
             Twist::Free
-        },
-        speed: match follower.travel {
+        })
+        .with_speed(match follower.travel {
             FollowerSpeed::Keys => PathSpeed::Keys,
             FollowerSpeed::Constant => PathSpeed::Constant,
             FollowerSpeed::Eased(start, end) => PathSpeed::Eased { start, end },
-        },
-        ..Follow::default()
-    }
+        })
 }
 
 fn at(follower: &Follower, times: &[f64]) -> Followed {
@@ -448,13 +446,13 @@ pub(super) fn option_sets() -> Vec<Follow> {
                     continue;
                 }
                 let method = VectorMethod::ALL[(i + j + all.len()) % 7];
-                all.push(Follow {
-                    method,
-                    direction,
-                    speed,
-                    frame,
-                    ..Follow::default()
-                });
+                all.push(
+                    Follow::default()
+                        .with_method(method)
+                        .with_direction(direction)
+                        .with_speed(speed)
+                        .with_frame(frame),
+                );
             }
         }
     }
@@ -512,23 +510,13 @@ fn paths_are_followed_together_as_alone() {
     let base = Follow::default();
     let follows = [
         base.clone(),
-        Follow {
-            axes: ["x", "-z"].map(|axis| axis.parse().unwrap()),
-            ..base.clone()
-        },
-        Follow {
-            speed: PathSpeed::Constant,
-            ..base.clone()
-        },
-        Follow {
-            frame: PathFrame::Fixed,
-            direction: Direction::Point(DVec3::new(0.0, 2.0, 9.0)),
-            ..base.clone()
-        },
-        Follow {
-            frame: PathFrame::Frenet,
-            ..base
-        },
+        base.clone()
+            .with_axes(["x", "-z"].map(|axis| axis.parse().unwrap())),
+        base.clone().with_speed(PathSpeed::Constant),
+        base.clone()
+            .with_frame(PathFrame::Fixed)
+            .with_direction(Direction::Point(DVec3::new(0.0, 2.0, 9.0))),
+        base.with_frame(PathFrame::Frenet),
     ];
     let frames = SampleTimes::fps(100).between(-0.1, 12.1);
     let found = |engine: &Engine, set: &TrackSet, follow: &Follow| {
@@ -568,16 +556,10 @@ fn a_body_looks_at_another() {
         end: 0.1,
     };
     for speed in [PathSpeed::Keys, PathSpeed::Constant, eased] {
-        let follow = Follow {
-            speed,
-            ..Follow::default()
-        };
+        let follow = Follow::default().with_speed(speed);
         let frames = SampleTimes::fps(60);
         let at = |direction| {
-            let follow = Follow {
-                direction,
-                ..follow.clone()
-            };
+            let follow = follow.clone().with_direction(direction);
             cpu().follow(&set, &follow, &frames, Layout::TrackMajor)
         };
         let error = at(Direction::Track(2)).unwrap_err();
@@ -655,25 +637,16 @@ fn what_cannot_be_followed_is_refused() {
     };
     let base = Follow::default;
     assert!(matches!(
-        refused(Follow {
-            ends: Ends::Loop,
-            ..base()
-        }),
+        refused(base().with_ends(Ends::Loop)),
         FollowError::OpenLoop { track: 0, .. }
     ));
     assert!(matches!(
-        refused(Follow {
-            up: DVec3::ZERO,
-            ..base()
-        }),
+        refused(base().with_up(DVec3::ZERO)),
         FollowError::Up { .. }
     ));
     for distance in [0.0, -1.0, f64::NAN, f64::INFINITY] {
         assert!(matches!(
-            refused(Follow {
-                direction: Direction::Ahead(distance),
-                ..base()
-            }),
+            refused(base().with_direction(Direction::Ahead(distance))),
             FollowError::Ahead { .. }
         ));
     }
@@ -682,17 +655,15 @@ fn what_cannot_be_followed_is_refused() {
         end: 0.5,
     };
     assert!(matches!(
-        refused(Follow { speed, ..base() }),
+        refused(base().with_speed(speed)),
         FollowError::Eased { .. }
     ));
-    let aside = Follow {
-        frame: PathFrame::Frenet,
-        direction: Direction::Ahead(1.0),
-        ..base()
-    };
+    let aside = base()
+        .with_frame(PathFrame::Frenet)
+        .with_direction(Direction::Ahead(1.0));
     assert_eq!(refused(aside), FollowError::FrenetAside);
     let axes = ["z".parse().unwrap(), "-z".parse().unwrap()];
-    assert_eq!(refused(Follow { axes, ..base() }), FollowError::Axes);
+    assert_eq!(refused(base().with_axes(axes)), FollowError::Axes);
     let mut rotations = TrackSet::new();
     rotations.push("", &[0.0], &[Quat::IDENTITY]).unwrap();
     let error = cpu().follow(
@@ -737,10 +708,7 @@ fn other_axes_face_forward() {
     let frames = SampleTimes::at(vec![1.75]);
     let of = |forward: &str, up: &str| {
         let axes = [forward.parse().unwrap(), up.parse().unwrap()];
-        let follow = Follow {
-            axes,
-            ..Follow::default()
-        };
+        let follow = Follow::default().with_axes(axes);
         cpu()
             .follow(&set, &follow, &frames, Layout::TrackMajor)
             .unwrap()

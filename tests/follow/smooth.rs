@@ -29,10 +29,7 @@ fn rotations(engine: &Engine, tracks: &[Vec<Quat>], layout: Layout) -> Rotations
         set.push("", &seconds(track.len()), track).unwrap();
     }
     let frames = SampleTimes::fps(1);
-    let as_authored = Interpolation {
-        signs: tumble::KeySigns::AsAuthored,
-        ..method::STEP.into()
-    };
+    let as_authored = Interpolation::from(method::STEP).with_signs(tumble::KeySigns::AsAuthored);
     engine
         .request(&set, as_authored, &frames)
         .layout(layout)
@@ -63,10 +60,7 @@ fn smoothed_numbers(name: &str, ends: SmoothingEnds, values: &[f32]) -> Vec<f32>
     let engine = cpu();
     let track: Vec<Vec3> = values.iter().map(|&y| Vec3::new(0.0, y, 0.0)).collect();
     let input = vectors(&engine, &[track], Layout::TrackMajor);
-    let smoothing = Smoothing {
-        ends,
-        ..Smoothing::new(kernel(name))
-    };
+    let smoothing = Smoothing::new(kernel(name)).with_ends(ends);
     let found = engine.smooth_vectors(&input, &smoothing).unwrap();
     (0..values.len())
         .map(|i| found.get(0, i).unwrap().y)
@@ -237,10 +231,7 @@ fn rotations_are_smoothed_by_the_book() {
         for name in ["linear", "box:2.25"] {
             for ends in [SmoothingEnds::Keep, SmoothingEnds::Loop] {
                 let input = tracks(&mut random, samples);
-                let smoothing = Smoothing {
-                    ends,
-                    ..Smoothing::new(kernel(name))
-                };
+                let smoothing = Smoothing::new(kernel(name)).with_ends(ends);
                 let evaluated = rotations(&engine, &input, Layout::FrameMajor);
                 let found = engine.smooth(&evaluated, &smoothing).unwrap();
                 for (track, keys) in input.iter().enumerate() {
@@ -286,11 +277,7 @@ fn the_same_bits_on_every_device() {
                 SmoothingEnds::Parabolic,
             ] {
                 for layout in [Layout::TrackMajor, Layout::FrameMajor] {
-                    let smoothing = Smoothing {
-                        ends,
-                        passes: 2,
-                        kernel: kernel(name),
-                    };
+                    let smoothing = Smoothing::new(kernel(name)).with_ends(ends).with_passes(2);
                     let on = |engine: &Engine| {
                         let smoothed =
                             engine.smooth(&rotations(&cpu(), &input, layout), &smoothing)?;
@@ -347,10 +334,7 @@ fn still_tracks_keep_their_bits_and_even_motion_stays() {
         .map(|i| DQuat::from_axis_angle(axis, step * f64::from(i)).as_quat())
         .collect();
     for name in KERNELS {
-        let smoothing = Smoothing {
-            passes: 3,
-            ..Smoothing::new(kernel(name))
-        };
+        let smoothing = Smoothing::new(kernel(name)).with_passes(3);
         let of = |track: &[Quat]| {
             let input = rotations(&engine, &[track.to_vec()], Layout::TrackMajor);
             (

@@ -231,11 +231,7 @@ fn long_passes_run_at_once() {
 
 #[test]
 fn what_does_not_fit_buffers_is_refused() {
-    let nothing = VulkanBuffer {
-        buffer: vk::Buffer::null(),
-        offset: 0,
-        size: u64::MAX / 2,
-    };
+    let nothing = VulkanBuffer::new(vk::Buffer::null(), u64::MAX / 2);
     let mix = |from, to, weight| PosePass::Mix { from, to, weight };
     let refused = |engine: &Engine, pass: PosePass<'_>, layout, result| {
         let request = engine.pass(pass, TRACKS, 4, layout);

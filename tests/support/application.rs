@@ -2,6 +2,7 @@
 #![allow(unsafe_code)] // creating a device is the application's part
 #![allow(dead_code)] // each test program uses some of it
 
+use std::ffi::CStr;
 use std::sync::{Arc, Mutex};
 
 use ash::vk;
@@ -86,10 +87,8 @@ impl Application {
                 .create_device(physical_device, &info, None)
                 .unwrap();
             let queue = device.get_device_queue(0, 0);
-            let copy_queue = copy_family.map(|family| VulkanQueue {
-                queue: device.get_device_queue(family, 0),
-                family,
-            });
+            let copy_queue = copy_family
+                .map(|family| VulkanQueue::new(device.get_device_queue(family, 0), family));
             Self {
                 instance,
                 physical_device,
@@ -127,20 +126,18 @@ impl Application {
     }
 
     pub(crate) fn handles(&self) -> VulkanHandles {
-        VulkanHandles {
-            entry: self.entry.clone(),
-            instance: self.instance.clone(),
-            api_version: vk::API_VERSION_1_1,
-            physical_device: self.physical_device,
-            device: self.device.clone(),
-            shader_float_controls: false,
-            shader_int64: self.shader_int64,
-            queue: self.queue,
-            queue_family: 0,
-            copy_queue: self.copy_queue,
-            queue_lock: Some(QueueLock::from(Arc::clone(&self.queue_lock))),
-            pipeline_cache: None,
-        }
+        let mut handles = VulkanHandles::new(
+            self.entry.clone(),
+            self.instance.clone(),
+            vk::API_VERSION_1_1,
+            self.physical_device,
+            self.device.clone(),
+            VulkanQueue::new(self.queue, 0),
+        );
+        handles.shader_int64 = self.shader_int64;
+        handles
+            .with_copy_queue(self.copy_queue)
+            .with_queue_lock(QueueLock::from(Arc::clone(&self.queue_lock)))
     }
 
     /// A buffer in memory that the host can see.
@@ -171,6 +168,84 @@ impl Application {
             let memory = self.device.allocate_memory(&info, None).unwrap();
             self.device.bind_buffer_memory(buffer, memory, 0).unwrap();
             (buffer, memory)
+        }
+    }
+
+    /// Runs a kernel over buffers, which it binds as 0, 1, 2 … of set 0, and waits for it.
+    pub(crate) fn run_kernel(
+        &self,
+        spirv: &[u32],
+        entry: &CStr,
+        buffers: &[&ApplicationBuffer<'_>],
+        workgroups: u32,
+    ) {
+        let device = &self.device;
+        let count = buffers.len() as u32;
+        let kind = vk::DescriptorType::STORAGE_BUFFER;
+        let binding = |index| {
+            vk::DescriptorSetLayoutBinding::default()
+                .binding(index)
+                .descriptor_type(kind)
+                .descriptor_count(1)
+                .stage_flags(vk::ShaderStageFlags::COMPUTE)
+        };
+        let bindings: Vec<_> = (0..count).map(binding).collect();
+        // SAFETY: plain use of a device that is alive; all is destroyed below, after its work has ended.
+        unsafe {
+            let info = vk::ShaderModuleCreateInfo::default().code(spirv);
+            let module = device.create_shader_module(&info, None).unwrap();
+            let info = vk::DescriptorSetLayoutCreateInfo::default().bindings(&bindings);
+            let sets = [device.create_descriptor_set_layout(&info, None).unwrap()];
+            let info = vk::PipelineLayoutCreateInfo::default().set_layouts(&sets);
+            let layout = device.create_pipeline_layout(&info, None).unwrap();
+            let stage = vk::PipelineShaderStageCreateInfo::default()
+                .stage(vk::ShaderStageFlags::COMPUTE)
+                .module(module)
+                .name(entry);
+            let info = [vk::ComputePipelineCreateInfo::default()
+                .stage(stage)
+                .layout(layout)];
+            let pipeline = device
+                .create_compute_pipelines(vk::PipelineCache::null(), &info, None)
+                .unwrap()[0];
+            let sizes = [vk::DescriptorPoolSize {
+                ty: kind,
+                descriptor_count: count,
+            }];
+            let info = vk::DescriptorPoolCreateInfo::default()
+                .max_sets(1)
+                .pool_sizes(&sizes);
+            let pool = device.create_descriptor_pool(&info, None).unwrap();
+            let info = vk::DescriptorSetAllocateInfo::default()
+                .descriptor_pool(pool)
+                .set_layouts(&sets);
+            let bound = device.allocate_descriptor_sets(&info).unwrap();
+            for (index, buffer) in buffers.iter().enumerate() {
+                let range = [vk::DescriptorBufferInfo {
+                    buffer: buffer.buffer,
+                    offset: 0,
+                    range: vk::WHOLE_SIZE,
+                }];
+                let write = vk::WriteDescriptorSet::default()
+                    .dst_set(bound[0])
+                    .dst_binding(index as u32)
+                    .descriptor_type(kind)
+                    .buffer_info(&range);
+                device.update_descriptor_sets(&[write], &[]);
+            }
+            let commands = Commands::new(self);
+            let recorded = commands.recorded(|commands| {
+                let compute = vk::PipelineBindPoint::COMPUTE;
+                device.cmd_bind_pipeline(commands, compute, pipeline);
+                device.cmd_bind_descriptor_sets(commands, compute, layout, 0, &bound, &[]);
+                device.cmd_dispatch(commands, workgroups, 1, 1);
+            });
+            commands.run(&[recorded]);
+            device.destroy_descriptor_pool(pool, None);
+            device.destroy_pipeline(pipeline, None);
+            device.destroy_pipeline_layout(layout, None);
+            device.destroy_descriptor_set_layout(sets[0], None);
+            device.destroy_shader_module(module, None);
         }
     }
 
@@ -219,11 +294,7 @@ impl<'a> ApplicationBuffer<'a> {
     }
 
     pub(crate) fn range(&self, offset: u64, size: u64) -> VulkanBuffer {
-        VulkanBuffer {
-            buffer: self.buffer,
-            offset,
-            size,
-        }
+        VulkanBuffer::new(self.buffer, size).at(offset)
     }
 
     pub(crate) fn bytes(&self) -> Vec<u8> {

@@ -79,10 +79,9 @@ fn assert_stores_whole_lines(
     crowd.set_clock(CLOCK).unwrap();
     let entries: Vec<_> = (0..INSTANCES as usize * layers)
         .map(|entry| {
-            let plays = CrowdLayer {
-                weight: 0.5,
-                ..CrowdLayer::new(random.usize(..2)).at(random.i64(..1 << 20))
-            };
+            let plays = CrowdLayer::new(random.usize(..2))
+                .at(random.i64(..1 << 20))
+                .with_weight(0.5);
             crowd.set(entry / layers, entry % layers, plays).unwrap();
             plays.packed(&library.tables.clips, 0, CLOCK).unwrap()
         })

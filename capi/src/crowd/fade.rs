@@ -2,7 +2,7 @@
 
 use tumble::crowd::CrowdFade;
 
-use crate::arguments::{Out, needed};
+use crate::arguments::{Out, SizedStructure, needed};
 use crate::crowd::player::TumbleCrowd;
 use crate::handle;
 use crate::result::{TumbleResult, code};
@@ -26,6 +26,11 @@ pub struct TumbleCrowdFade {
     pub from: f32,
     /// The weight after the fade, 0 to 1, rounded to a multiple of 2^-15.
     pub to: f32,
+}
+
+// SAFETY: `repr(C)`, the size is first, and zeros are numbers.
+unsafe impl SizedStructure for TumbleCrowdFade {
+    const FIRST_SIZE: usize = size_of::<Self>();
 }
 
 /// Sets the weight of a layer above layer 0: 0 to 1, rounded to a multiple of 2^-15. The layer's clip, time and speed
@@ -90,16 +95,10 @@ pub unsafe extern "C" fn tumble_crowd_set_fade(
     code(|| {
         let crowd = handle::get(crowd)?;
         // SAFETY: as the caller promises.
-        let fade = unsafe {
-            let size = |pointer: *const TumbleCrowdFade| (&raw const (*pointer).size).cast();
-            needed(fade, size, "fade")?
-        };
-        let set = CrowdFade {
-            from: fade.from,
-            to: fade.to,
-            start: fade.start,
-            ticks: fade.ticks,
-        };
+        let fade = unsafe { needed(fade, "fade")? };
+        let set = CrowdFade::new(fade.from, fade.to)
+            .with_start(fade.start)
+            .with_ticks(fade.ticks);
         Ok((crowd.lock()?.inner).set_fade(fade.instance, fade.layer, set)?)
     })
 }
@@ -126,23 +125,21 @@ pub unsafe extern "C" fn tumble_crowd_get_fade(
         let crowd = handle::get(crowd)?;
         let has_fade = Out::new(fades, "fades")?;
         // SAFETY: as the caller promises.
-        let requested = unsafe {
-            let size = |pointer: *const TumbleCrowdFade| (&raw const (*pointer).size).cast();
-            needed(fade.cast_const(), size, "fade")?
-        };
+        let requested = unsafe { needed(fade.cast_const(), "fade")? };
         let out = Out::new(fade, "fade")?;
         let found = (crowd.lock()?.inner).get_fade(requested.instance, requested.layer)?;
         // SAFETY: as the caller promises.
         unsafe {
             has_fade.set(found.is_some());
             if let Some(found) = found {
-                out.set(TumbleCrowdFade {
+                let found = TumbleCrowdFade {
                     start: found.start,
                     ticks: found.ticks,
                     from: found.from,
                     to: found.to,
                     ..requested
-                });
+                };
+                out.set_sized(&found, requested.size);
             }
         }
         Ok(())

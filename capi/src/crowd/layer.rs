@@ -1,9 +1,9 @@
 //! A layer of an instance: the clip that it plays, and its time, speed and weight.
 
 use tumble::WrapMode;
-use tumble::crowd::CrowdLayer;
+use tumble::crowd::{CrowdLayer, LayerBlend};
 
-use crate::arguments::{flag, option};
+use crate::arguments::{SizedStructure, flag, option};
 use crate::result::Failure;
 
 /// The clip that a layer of an instance plays, and its time, speed, wrap mode and weight. If all members except
@@ -36,27 +36,30 @@ pub struct TumbleCrowdLayer {
     pub mask: usize,
 }
 
+// SAFETY: `repr(C)`, the size is first, and zeros are numbers.
+unsafe impl SizedStructure for TumbleCrowdLayer {
+    const FIRST_SIZE: usize = size_of::<Self>();
+}
+
 impl TumbleCrowdLayer {
     /// The instance, the layer and its new state; `index` is the change's index for messages.
     pub(crate) fn change(&self, index: usize) -> Result<(usize, usize, CrowdLayer), Failure> {
-        let size = size_of::<Self>();
-        if self.size != size {
-            let message = format!(
-                "`layers[{index}].size` is {}, and this version's structure has {size} bytes; set it \
-                 to `sizeof`, with the header of the library's version",
-                self.size
-            );
-            return Err(Failure::argument(message));
-        }
-        let plays = CrowdLayer {
-            clip: self.clip,
-            time: self.time,
-            speed: self.speed,
-            wrap: option(self.wrap, &WrapMode::ALL, &format!("layers[{index}].wrap"))?,
-            weight: self.weight,
-            additive: flag(self.additive, &format!("layers[{index}].additive"))?,
-            mask: self.mask.checked_sub(1),
-        };
+        let plays = CrowdLayer::new(self.clip)
+            .at(self.time)
+            .with_speed(self.speed)
+            .with_wrap(option(
+                self.wrap,
+                &WrapMode::ALL,
+                &format!("layers[{index}].wrap"),
+            )?)
+            .with_weight(self.weight)
+            .with_blend(
+                match flag(self.additive, &format!("layers[{index}].additive"))? {
+                    true => LayerBlend::Additive,
+                    false => LayerBlend::Over,
+                },
+            )
+            .with_mask(self.mask.checked_sub(1));
         Ok((self.instance, self.layer, plays))
     }
 
@@ -72,7 +75,7 @@ impl TumbleCrowdLayer {
             speed: plays.speed,
             weight: plays.weight,
             wrap: wrap.unwrap_or(0) as u32,
-            additive: plays.additive.into(),
+            additive: u32::from(plays.blend == LayerBlend::Additive),
             mask: plays.mask.map_or(0, |mask| mask + 1),
         }
     }

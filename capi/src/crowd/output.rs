@@ -26,7 +26,10 @@ pub enum TumbleCrowdValues {
 /// The output for a C constant, in 32 or 16 bits.
 pub(crate) fn output(values: u32, is_half: bool) -> Result<CrowdOutput, Failure> {
     let values = option(values, &CrowdValues::ALL, "values")?;
-    Ok(CrowdOutput { values, is_half })
+    Ok(match is_half {
+        true => CrowdOutput::half(values),
+        false => values.into(),
+    })
 }
 
 /// The caller's memory for a result; an error if `count` is not exactly the result's size.

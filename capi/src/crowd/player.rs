@@ -4,7 +4,7 @@ use std::sync::{Mutex, MutexGuard};
 
 use tumble::crowd::{Crowd, CrowdLayer};
 
-use crate::arguments::{Out, list, needed};
+use crate::arguments::{Out, needed, sized_list};
 use crate::crowd::layer::TumbleCrowdLayer;
 use crate::crowd::library::TumbleCrowdLibrary;
 use crate::engine::TumbleEngine;
@@ -94,12 +94,12 @@ pub unsafe extern "C" fn tumble_crowd_set(
     code(|| {
         let crowd = handle::get(crowd)?;
         // SAFETY: as the caller promises.
-        let layers = unsafe { list(layers, count, "layers")? };
+        let layers = unsafe { sized_list(layers, count, "layers")? };
         let mut state = crowd.lock()?;
         let State { inner, changes } = &mut *state;
         changes.clear();
-        for (index, layer) in layers.iter().enumerate() {
-            changes.push(layer.change(index)?);
+        for (index, layer) in layers.enumerate() {
+            changes.push(layer?.change(index)?);
         }
         Ok(inner.set_all(changes)?)
     })
@@ -122,10 +122,7 @@ pub unsafe extern "C" fn tumble_crowd_get(
     code(|| {
         let crowd = handle::get(crowd)?;
         // SAFETY: as the caller promises.
-        let requested = unsafe {
-            let size = |pointer: *const TumbleCrowdLayer| (&raw const (*pointer).size).cast();
-            needed(layer.cast_const(), size, "layer")?
-        };
+        let requested = unsafe { needed(layer.cast_const(), "layer")? };
         let out = Out::new(layer, "layer")?;
         let plays = crowd
             .lock()?
@@ -133,11 +130,11 @@ pub unsafe extern "C" fn tumble_crowd_get(
             .get(requested.instance, requested.layer)?;
         // SAFETY: as the caller promises.
         unsafe {
-            out.set(TumbleCrowdLayer::new(
-                requested.instance,
-                requested.layer,
-                plays,
-            ));
+            let found = TumbleCrowdLayer {
+                size: requested.size,
+                ..TumbleCrowdLayer::new(requested.instance, requested.layer, plays)
+            };
+            out.set_sized(&found, requested.size);
         }
         Ok(())
     })

@@ -4,7 +4,9 @@ use std::ffi::{CStr, CString, c_char};
 use std::ptr::{null, null_mut};
 
 use glam::{Affine3A, Mat3A, Quat, Vec3};
-use tumble::crowd::{Crowd, CrowdFade, CrowdLayer, CrowdLibrary, CrowdOutput, CrowdValues};
+use tumble::crowd::{
+    Crowd, CrowdFade, CrowdLayer, CrowdLibrary, CrowdOutput, CrowdValues, LayerBlend,
+};
 use tumble::{Device, Engine, Skeleton, TrackSet, VectorMethod, WrapMode, method};
 
 use super::{cpu, defaults, fails, words};
@@ -211,15 +213,17 @@ fn plays(frame: usize, (instances, layers): (usize, usize)) -> Vec<(TumbleCrowdL
             continue;
         }
         let wraps = [WrapMode::Hold, WrapMode::Loop, WrapMode::Mirror];
-        let rust_layer = CrowdLayer {
-            clip: (i + frame) % 3,
-            time: i as i64 * 50_000 - 200_000,
-            speed: i as f32 * 0.125 - 1.0,
-            wrap: wraps[(i + frame) % 3],
-            weight: (i % 5) as f32 * 0.25,
-            additive: i % 4 == 1,
-            mask: i.is_multiple_of(2).then_some(0),
-        };
+        let rust_layer = CrowdLayer::new((i + frame) % 3)
+            .at(i as i64 * 50_000 - 200_000)
+            .with_speed(i as f32 * 0.125 - 1.0)
+            .with_wrap(wraps[(i + frame) % 3])
+            .with_weight((i % 5) as f32 * 0.25)
+            .with_blend(if i % 4 == 1 {
+                LayerBlend::Additive
+            } else {
+                LayerBlend::Over
+            })
+            .with_mask(i.is_multiple_of(2).then_some(0));
         let layer = TumbleCrowdLayer {
             instance: i / layers,
             layer: i % layers,
@@ -228,7 +232,7 @@ fn plays(frame: usize, (instances, layers): (usize, usize)) -> Vec<(TumbleCrowdL
             speed: rust_layer.speed,
             weight: rust_layer.weight,
             wrap: ((i + frame) % 3) as u32,
-            additive: rust_layer.additive.into(),
+            additive: u32::from(rust_layer.blend == LayerBlend::Additive),
             mask: rust_layer.mask.map_or(0, |mask| mask + 1),
             ..still()
         };
@@ -491,12 +495,9 @@ fn fades_and_lists_are_those_of_the_engine() {
             from: 0.25,
             to: 0.75,
         };
-        let rust_fade = CrowdFade {
-            from: 0.25,
-            to: 0.75,
-            start: 50_000,
-            ticks: 100_000,
-        };
+        let rust_fade = CrowdFade::new(0.25, 0.75)
+            .with_start(50_000)
+            .with_ticks(100_000);
         let mut is_there = false;
         // SAFETY: structures, and room for the truth value.
         unsafe {
@@ -516,6 +517,7 @@ fn fades_and_lists_are_those_of_the_engine() {
             ticks,
             from,
             to,
+            ..
         } = of_engine;
         assert!(is_there && found == (start, ticks, from, to));
         let output = CrowdOutput::from(CrowdValues::Model);
@@ -612,10 +614,9 @@ fn sets_are_matched_to_the_joints_by_name() {
     });
     done(set_layers(crowd, &clips));
     for (instance, plays) in clips.iter().enumerate() {
-        let layer = CrowdLayer {
-            speed: plays.speed,
-            ..CrowdLayer::new(plays.clip).at(plays.time)
-        };
+        let layer = CrowdLayer::new(plays.clip)
+            .at(plays.time)
+            .with_speed(plays.speed);
         rust_crowd.set(instance, 0, layer).unwrap();
     }
     let output = CrowdOutput::from(CrowdValues::Model);

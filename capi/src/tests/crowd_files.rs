@@ -76,10 +76,7 @@ fn same(library: *mut TumbleCrowdLibrary, rust_library: &CrowdLibrary) {
             ..still()
         };
         done(set_layers(crowd, &[layer]));
-        let plays = CrowdLayer {
-            speed: 0.0,
-            ..CrowdLayer::new(clip).at(time)
-        };
+        let plays = CrowdLayer::new(clip).at(time).with_speed(0.0);
         expected.set(instance, 0, plays).unwrap();
     }
     for values in [

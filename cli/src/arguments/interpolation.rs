@@ -58,19 +58,17 @@ fn finite(text: &str) -> Result<f64, String> {
 impl InterpolationArguments {
     /// The options as the engine has them.
     pub(crate) fn options(self) -> InterpolationOptions {
-        InterpolationOptions {
-            signs: self.signs,
-            ends: self.ends,
-            speed: self.speed,
-            before: self.before.wrap_mode(),
-            after: self.after.wrap_mode(),
-            tcb: tumble::Tcb {
+        InterpolationOptions::DEFAULT
+            .with_signs(self.signs)
+            .with_ends(self.ends)
+            .with_speed(self.speed)
+            .with_before(self.before.wrap_mode())
+            .with_after(self.after.wrap_mode())
+            .with_tcb(tumble::Tcb {
                 tension: self.tension.unwrap_or_default(),
                 continuity: self.continuity.unwrap_or_default(),
                 bias: self.bias.unwrap_or_default(),
-            },
-            ..InterpolationOptions::DEFAULT
-        }
+            })
     }
 
     /// The interpolation by a method.
@@ -160,21 +158,23 @@ fn names_of(methods: &[Method]) -> String {
 
 /// Parses the name of a kind of ends, of curves through rotations or through points.
 pub(crate) fn ends() -> impl TypedValueParser<Value = Ends> {
-    let help = |ends| match ends {
+    let help = |ends: Ends| match ends {
         Ends::Parabolic => "the parabola through the last three keys or points",
         Ends::Natural => "no acceleration at the ends",
         Ends::Clamped { .. } => "start and end at rest",
         Ends::Secant => "the mean velocity between the last two keys or points",
         Ends::Loop => "a closed curve: the last key or point equals the first",
         Ends::Frozen => "the first and the last segment stand still",
+        other => other.name(),
     };
     one_of(Ends::ALL.map(|ends| (ends.name(), help(ends), ends)))
 }
 
 fn speed() -> impl TypedValueParser<Value = Speed> {
-    let help = |speed| match speed {
+    let help = |speed: Speed| match speed {
         Speed::AsKeyed => "as the key times say",
         Speed::Constant => "at constant angular speed",
+        other => other.name(),
     };
     one_of(Speed::ALL.map(|speed| (speed.name(), help(speed), speed)))
 }
@@ -211,11 +211,12 @@ pub(crate) fn of_outside(error: OutsideError, name: &str) -> Failure {
 }
 
 fn outside() -> impl TypedValueParser<Value = OutsideValue> {
-    let help = |mode| match mode {
+    let help = |mode: WrapMode| match mode {
         WrapMode::Hold => "the end value",
         WrapMode::Loop => "the track repeats",
         WrapMode::Mirror => "the track runs backwards and forwards in turn",
         WrapMode::Extrapolate => "continues at the velocity of the end",
+        other => other.name(),
     };
     let wrapped = WrapMode::ALL.map(|mode| (mode.name(), help(mode), OutsideValue::Wrap(mode)));
     let left_out = OutsideValue::LeaveOut;
@@ -365,10 +366,7 @@ impl CurveChoice {
     pub(crate) fn channel_methods(self) -> ChannelMethods {
         ChannelMethods {
             method: self.method,
-            options: InterpolationOptions {
-                quantity: self.quantity,
-                ..self.options.options()
-            },
+            options: self.options.options().with_quantity(self.quantity),
         }
     }
 

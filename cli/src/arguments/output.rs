@@ -82,6 +82,7 @@ fn outputs() -> Vec<NamedValue<OutputKind>> {
             }
             ScalarQuantity::Velocity => "their velocities, per second: derivatives of the curves",
             ScalarQuantity::Acceleration => "their accelerations, per second squared",
+            other => other.name(),
         };
         (scalar_output(quantity), help, OutputKind::Scalars(quantity))
     }));
@@ -98,6 +99,7 @@ fn scalar_output(quantity: ScalarQuantity) -> &'static str {
         ScalarQuantity::Value => "scalars",
         ScalarQuantity::Velocity => "scalar-velocities",
         ScalarQuantity::Acceleration => "scalar-accelerations",
+        other => other.name(),
     }
 }
 
@@ -187,7 +189,11 @@ impl OutputArguments {
             | OutputKind::Transform
             | OutputKind::World
             | OutputKind::Scalars(_) => components,
-            OutputKind::Encoded(encoding) => encoding.with(EncodingOptions { order, sequence }),
+            OutputKind::Encoded(encoding) => encoding.with(
+                EncodingOptions::default()
+                    .with_order(order)
+                    .with_sequence(sequence),
+            ),
             OutputKind::Velocity | OutputKind::Acceleration => Encoding::Vector,
         }
     }
@@ -258,26 +264,27 @@ impl OutputArguments {
     /// Whether the axes of angles change the result.
     pub(crate) fn is_euler(&self) -> bool {
         let sequence = "ZXY".parse().unwrap_or(EulerSequence::XYZ);
-        self.depends_on(EncodingOptions {
-            order: MatrixOrder::RowMajor,
-            sequence,
-        })
+        self.depends_on(
+            EncodingOptions::default()
+                .with_order(MatrixOrder::RowMajor)
+                .with_sequence(sequence),
+        )
     }
 
     /// Whether the order of a matrix's elements changes the result.
     pub(crate) fn is_matrix(&self) -> bool {
-        self.depends_on(EncodingOptions {
-            order: MatrixOrder::ColumnMajor,
-            sequence: EulerSequence::XYZ,
-        })
+        self.depends_on(
+            EncodingOptions::default()
+                .with_order(MatrixOrder::ColumnMajor)
+                .with_sequence(EulerSequence::XYZ),
+        )
     }
 
     /// Whether these options change the encoding.
     fn depends_on(&self, options: EncodingOptions) -> bool {
-        let default = EncodingOptions {
-            order: MatrixOrder::RowMajor,
-            sequence: EulerSequence::XYZ,
-        };
+        let default = EncodingOptions::default()
+            .with_order(MatrixOrder::RowMajor)
+            .with_sequence(EulerSequence::XYZ);
         match self.output {
             OutputKind::Encoded(encoding) => encoding.with(default) != encoding.with(options),
             _ => false,

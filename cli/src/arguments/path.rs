@@ -81,6 +81,7 @@ pub(crate) fn frame_summary(frame: PathFrame) -> &'static str {
         PathFrame::Minimal => "no rotation about the direction (rotation-minimizing)",
         PathFrame::Fixed => "the upward axis stays as close to the upward direction as possible",
         PathFrame::Frenet => "the path's normal (Frenet), without its flips",
+        other => other.name(),
     }
 }
 
@@ -232,19 +233,18 @@ impl PathArguments {
         name: &str,
         frame: PathFrame,
     ) -> Result<Follow, Failure> {
-        Ok(Follow {
-            method: self.path_method,
-            ends: self.path_ends,
-            direction: match self.direction.of(&paths.set, name)? {
+        Ok(Follow::default()
+            .with_method(self.path_method)
+            .with_ends(self.path_ends)
+            .with_direction(match self.direction.of(&paths.set, name)? {
                 Direction::Point(point) => Direction::Point(point - paths.origin(0)),
                 direction => direction,
-            },
-            frame,
-            up: self.path_up,
-            twist: self.twist,
-            speed: self.path_speed,
-            axes: [self.body_forward, self.body_up],
-        })
+            })
+            .with_frame(frame)
+            .with_up(self.path_up)
+            .with_twist(self.twist)
+            .with_speed(self.path_speed)
+            .with_axes([self.body_forward, self.body_up]))
     }
 }
 

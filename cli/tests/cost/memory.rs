@@ -57,10 +57,7 @@ fn a_sampler_allocates_nothing_after_it_was_made() {
             WrapMode::Hold,
         ),
     ] {
-        let interpolation = Interpolation {
-            after,
-            ..method.into()
-        };
+        let interpolation = Interpolation::from(method).with_after(after);
         let clip = engine.upload(set, interpolation).unwrap();
         if std::ptr::eq(set, &raw const turning_little) {
             assert!(clip.bytes_per_key() < 100.0, "{method}");

@@ -78,7 +78,7 @@ fn a_fault_in_the_library_is_an_error_and_leaks_nothing() {
 fn library_work() {
     let work = || -> Result<(), Error> {
         // With the validation layer where there is one.
-        let devices = match Device::list_with(true) {
+        let devices = match Device::list_validated() {
             Err(VulkanError::NoValidation) => Device::list()?,
             devices => devices?,
         };

@@ -599,10 +599,7 @@ impl Sampled {
         let mut rows: Vec<Quat> = poses.as_quats().to_vec();
         continue_signs(&mut rows, tracks);
         sampled.rotations = rows.iter().map(Quat::to_array).collect();
-        let rate = Interpolation {
-            quantity: Quantity::Velocity(Axes::Parent),
-            ..*rotations
-        };
+        let rate = rotations.with_quantity(Quantity::Velocity(Axes::Parent));
         sampled.angular = engine
             .rates(set, rate, frames, layout)?
             .as_arrays()

@@ -446,10 +446,9 @@ impl Engine {
         device_array: bool,
         options: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let with = EncodingOptions {
-            order: option_named(major, "major")?,
-            sequence: sequence_named(sequence)?,
-        };
+        let with = EncodingOptions::default()
+            .with_order(option_named(major, "major")?)
+            .with_sequence(sequence_named(sequence)?);
         let result = OutputForm {
             encoding: encoding_named(encoding, with)?,
             radians: !degrees,
@@ -812,10 +811,7 @@ impl Engine {
                 (Quantity::Velocity(Axes::Body), Encoding::Vector),
             ];
             for (quantity, encoding) in kinds {
-                let interpolation = Interpolation {
-                    quantity,
-                    ..Interpolation::from(method)
-                };
+                let interpolation = Interpolation::from(method).with_quantity(quantity);
                 let warmed = engine.warm(interpolation, encoding);
                 warmed.map_err(|error| of_engine(&error))?;
             }

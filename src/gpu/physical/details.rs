@@ -31,6 +31,7 @@ pub struct DeviceDetails {
 
 /// A memory heap.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+#[non_exhaustive]
 pub struct MemoryHeap {
     /// The size, bytes.
     pub bytes: u64,
@@ -40,6 +41,7 @@ pub struct MemoryHeap {
 
 /// A memory type.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+#[non_exhaustive]
 pub struct MemoryType {
     /// The index of the heap.
     pub heap: u32,
@@ -49,6 +51,7 @@ pub struct MemoryType {
 
 /// A queue family.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+#[non_exhaustive]
 pub struct QueueFamily {
     /// The number of queues.
     pub queues: u32,
@@ -61,6 +64,7 @@ pub struct QueueFamily {
 /// Limits of a device, with Vulkan's names.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
 #[allow(missing_docs)] // the names are Vulkan's
+#[non_exhaustive]
 pub struct Limits {
     pub max_storage_buffer_range: u32,
     pub max_per_stage_descriptor_storage_buffers: u32,
@@ -79,6 +83,7 @@ pub struct Limits {
 /// Properties of a device's f32 arithmetic (`VkPhysicalDeviceFloatControlsProperties`).
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
 #[allow(missing_docs)] // the names are Vulkan's
+#[non_exhaustive]
 pub struct FloatControlsReport {
     pub preserves_signed_zero_inf_nan: bool,
     pub rounds_to_nearest_even: bool,

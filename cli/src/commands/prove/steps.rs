@@ -541,7 +541,7 @@ impl ProofRun<'_> {
     /// Expressions, recorded results, random rounds and a renderer's device under the validation layer.
     fn validate(&mut self) -> Result<(), StepError> {
         let uuid = self.vulkan.info().uuid.clone();
-        let devices = Device::list_with(true)?;
+        let devices = Device::list_validated()?;
         let same = |device: &Device| device.uuid().as_ref() == Some(&uuid);
         let device = devices.into_iter().find(same);
         let device = device.ok_or(tumble::vulkan::VulkanError::NoDevice)?;

@@ -82,12 +82,13 @@ pub(crate) struct Arguments {
 }
 
 fn edges() -> impl TypedValueParser<Value = SmoothingEnds> {
-    let help = |ends| match ends {
+    let help = |ends: SmoothingEnds| match ends {
         SmoothingEnds::Keep => "the end samples stay",
         SmoothingEnds::Parabolic => {
             "cubic: the end samples go to the parabola through the next three"
         }
         SmoothingEnds::Loop => "the last sample repeats the first",
+        other => other.name(),
     };
     one_of(SmoothingEnds::ALL.map(|ends| (ends.name(), help(ends), ends)))
 }
@@ -102,11 +103,9 @@ fn frequency(text: &str) -> Result<f64, String> {
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let smoothing = Smoothing {
-        kernel: arguments.kernel,
-        ends: arguments.edges,
-        passes: arguments.passes,
-    };
+    let smoothing = Smoothing::new(arguments.kernel)
+        .with_ends(arguments.edges)
+        .with_passes(arguments.passes);
     smoothing
         .check()
         .map_err(|error| Failure::usage(error.to_string()))?;

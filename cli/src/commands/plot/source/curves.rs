@@ -294,10 +294,7 @@ impl PlotSource<'_> {
         let mut curves = Vec::new();
         for (order, &choice) in self.choices.iter().enumerate() {
             let interpolation = self.interpolation(choice, index);
-            let velocity = Interpolation {
-                quantity: Quantity::Velocity(Axes::Body),
-                ..interpolation
-            };
+            let velocity = interpolation.with_quantity(Quantity::Velocity(Axes::Body));
             let velocities = self.rates(device, index, velocity)?;
             let velocities = velocities.as_slice().iter();
             let speeds = velocities.map(|v| f64::from(v.truncate().length()));
