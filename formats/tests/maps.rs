@@ -432,11 +432,10 @@ fn tables_of_motion_capture_are_read_or_told_the_export_that_is() {
     let motive = |turning: &str, kind: &str| {
         format!(
             "Format Version,1.23,Take Name,T,Rotation Type,{turning},Length Units,Centimeters\n\n\
-             ,Type,{0},{0},{0},{0},{0},{0},{0},Marker\n,Name,a,a,a,a,a,a,a,m\n\
+             ,Type,{kind},{kind},{kind},{kind},{kind},{kind},{kind},Marker\n,Name,a,a,a,a,a,a,a,m\n\
              ,,Rotation,Rotation,Rotation,Rotation,Position,Position,Position,Position\n\
              Frame,Time (Seconds),X,Y,Z,W,X,Y,Z,X\n\
-             0,0.0,0,0,0,1,1,2,3,9\n1,0.5,0,0,0.6,0.8,4,5,6,9\n",
-            kind
+             0,0.0,0,0,0,1,1,2,3,9\n1,0.5,0,0,0.6,0.8,4,5,6,9\n"
         )
     };
     let loaded = read(&motive("Quaternion", "Rigid Body"), None, false).unwrap();

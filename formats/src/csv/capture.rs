@@ -1,4 +1,4 @@
-//! Tables of motion capture systems, whose columns are named by several rows: OptiTrack Motive and Vicon (Nexus,
+//! Tables of motion capture systems, whose columns are named by several rows: `OptiTrack` Motive and Vicon (Nexus,
 //! Tracker). From these rows follow the names that other tables have: `drone.x` to `drone.w` for a rotation, `drone.px`
 //! to `drone.pz` for a position in the world.
 
@@ -67,7 +67,8 @@ impl CaptureHeading {
         let first = cells(first);
         let is_alone = first.iter().skip(1).all(String::is_empty);
         let is_motive = at(&first, 0) == "Format Version";
-        if !is_motive && !(is_alone && TABLES.contains(&at(&first, 0))) {
+        let is_vicon = is_alone && TABLES.contains(&at(&first, 0));
+        if !(is_motive || is_vicon) {
             return Ok(None);
         }
         let mut rows = vec![first];
