@@ -187,7 +187,7 @@ codes! {
     NodeTree = "E106", "nodes that are not a tree", "A node must have at most one parent and must not be among its ancestors.";
     Uri = "E107", "a URI that is not followed", "Data is read from the file itself and from files in its folder and below, named by relative URIs; nothing is fetched from a network.";
     TooShort = "E108", "fewer bytes than needed", "A buffer, a buffer view or an accessor needs more bytes than there are; the file may be truncated.";
-    AccessorType = "E109", "an accessor of the wrong type", "Times are floats. Rotations are four floats or normalized integers, translations and scales three.";
+    AccessorType = "E109", "an accessor of the wrong type", "Times are floats. Rotations are four floats or normalized integers, translations and scales three, weights of morph targets one.";
     Sparse = "E110", "a sparse accessor that does not fit", "Its indices must be unsigned integers that increase and are less than the number of elements.";
     OutputCount = "E111", "not as many values as times", "LINEAR and STEP have a value for each time, CUBICSPLINE three: tangent, value, tangent.";
     Interpolation = "E112", "an unknown interpolation", "glTF 2.0 has LINEAR, STEP and CUBICSPLINE.";
