@@ -343,10 +343,8 @@ fn gltf_cubic_spline_without_tangents_takes_the_shorter_rotation() {
     }
     // It eases: in the middle of an interval it is 1.5 times as fast as on the average.
     let engine = Engine::new(Device::Cpu).unwrap();
-    let velocity = Interpolation {
-        quantity: Quantity::Velocity(Axes::Body),
-        ..method::GLTF_CUBIC.into()
-    };
+    let velocity =
+        Interpolation::from(method::GLTF_CUBIC).with_quantity(Quantity::Velocity(Axes::Body));
     let frames = SampleTimes::fps(60);
     let velocities = engine
         .rates(&set, velocity, &frames, Layout::TrackMajor)
@@ -359,10 +357,7 @@ fn gltf_cubic_spline_without_tangents_takes_the_shorter_rotation() {
 
     // As glTF specifies, keys with tangents keep their signs, and so do all if that is asked for: halfway from `p` to
     // `-q` is `p - q`.
-    let authored = Interpolation {
-        signs: KeySigns::AsAuthored,
-        ..method::GLTF_CUBIC.into()
-    };
+    let authored = Interpolation::from(method::GLTF_CUBIC).with_signs(KeySigns::AsAuthored);
     let halfway = (any_signs[0] + any_signs[1]).normalize();
     assert!(angle_between(evaluate(&set, authored, &at)[1], halfway) < 1e-5);
     let still = Quat::from_array([0.0; 4]);

@@ -3,7 +3,7 @@
 use glam::{DVec3, Quat, Vec3};
 use tumble::reference::{ReferenceCurve, angle_between};
 use tumble::verify::error_bound;
-use tumble::{Axes, Interpolation, Quantity, TrackSet};
+use tumble::{Axes, Quantity, TrackSet};
 use tumble_formats::motion::{Motion, ScalarKind};
 use tumble_formats::printable::printable;
 
