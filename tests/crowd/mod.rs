@@ -271,11 +271,7 @@ fn crowds_of_arcs_have_the_bits_of_the_cpu() {
         let layers: Vec<_> = (0..INSTANCES)
             .map(|_| layer(&mut random, &library))
             .collect();
-        let plays = |layer: &CrowdLayer| {
-            let mut layer = layer.with_blend(LayerBlend::Over);
-            layer.mask = None;
-            layer
-        };
+        let plays = |layer: &CrowdLayer| layer.with_mask(None).with_blend(LayerBlend::Over);
         for ticks in [0, 11_760, 1 << 33] {
             let mut expected = None;
             for (name, crowd) in &mut all {
