@@ -1,4 +1,4 @@
-//! Motion of robots in JSON: frames of AMP for legged robots and of DeepMimic's humanoid, and the episodes of Unitree's
+//! Motion of robots in JSON: frames of AMP for legged robots and of `DeepMimic`'s humanoid, and the episodes of Unitree's
 //! `xr_teleoperate`.
 
 use std::path::Path;
@@ -217,7 +217,7 @@ fn frames_of_amp(
     npz::read_plan(&archive, &mut plan, options, warnings)
 }
 
-/// The numbers of a frame of DeepMimic's humanoid: how long it lasts, where the root is, a quaternion for the root and
+/// The numbers of a frame of `DeepMimic`'s humanoid: how long it lasts, where the root is, a quaternion for the root and
 /// each ball, and an angle for each hinge.
 const DEEPMIMIC: usize = 44;
 const DEEPMIMIC_ROOT: usize = 1;
@@ -239,7 +239,7 @@ const DEEPMIMIC_HINGES: [(&str, usize); 4] = [
     ("left_elbow", 43),
 ];
 
-/// The motion of DeepMimic's humanoid: rotations of the root and the balls, each relative to the body before it, y up, and
+/// The motion of `DeepMimic`'s humanoid: rotations of the root and the balls, each relative to the body before it, y up, and
 /// angles of the knees and elbows.
 fn frames_of_deepmimic(
     file: &str,
