@@ -687,7 +687,7 @@ fn directories_may_have_anything() {
 
     let empty = run(folder, &["eval", "empty", "walks/old", "-o", "partly"]);
     assert_eq!(empty.code, 3, "{}", empty.words);
-    let expected = "empty: error[E002]: is a directory without a file of a format that is read";
+    let expected = "empty: error[E002]: is a directory without files in readable formats";
     assert!(empty.words.contains(expected), "{}", empty.words);
     let none = run(folder, &["eval", "a.dat", "-o", "none", "--exclude", "*"]);
     assert_eq!(none.code, 2, "{}", none.words);

@@ -426,7 +426,7 @@ fn a_body_without_places_is_a_typical_one() {
     ];
     let said = succeed(folder.path(), &line).words;
     assert!(
-        said.contains("so that a typical body is drawn; give a model of it with --body-model"),
+        said.contains("so a typical body is drawn; give its model with --body-model"),
         "{said}"
     );
     assert!(said.contains("52 joints"), "{said}");

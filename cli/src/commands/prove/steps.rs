@@ -65,9 +65,6 @@ type SettingParts = (
     Option<u64>,
 );
 
-/// How the names of kernels end that convert to half precision as the device does.
-const CONVERTING: &str = "_converting";
-
 impl DeviceSetting {
     fn new((reading, moving, memory): SettingParts) -> Self {
         let mut options = EngineOptions::default();
@@ -324,7 +321,8 @@ impl ProofRun<'_> {
         for (setting, engine) in self.settings.iter().zip(&self.engines) {
             let reads = setting.options.reads;
             let texels = engine.choices().map(|choices| choices.reads) == Some("texel-buffers");
-            let all = tumble::vulkan::kernels().map(|(name, _)| name);
+            // Those that this device can run, in the variants that it runs.
+            let all = engine.known_kernels().into_iter().map(|check| check.name);
             let known = expected.len();
             expected.extend(all.filter(|name| name.ends_with("_texels") == texels));
             let is_known = expected.len() == known;
@@ -346,16 +344,6 @@ impl ProofRun<'_> {
                 started.elapsed() < allowed
             })?;
         }
-        // A device converts to half precision itself or not: it has one of two variants of these kernels.
-        let converts = ran.iter().any(|name| name.ends_with(CONVERTING));
-        let variants = expected
-            .iter()
-            .filter_map(|name| name.strip_suffix(CONVERTING));
-        let variants: BTreeSet<&str> = variants.collect();
-        expected.retain(|name| match name.ends_with(CONVERTING) {
-            true => converts,
-            false => !(converts && variants.contains(name)),
-        });
         let kernels = &mut self.proof.kernels;
         kernels.count = expected.len();
         kernels.ran = expected.intersection(&ran).count();

@@ -133,7 +133,7 @@ fn what_did_not_run_or_was_not_compared_is_not_proved() {
             ("control did not run", |proof| {
                 proof.negative_control = NegativeControl::default();
             }),
-            ("control saw no difference", |proof| {
+            ("control found no difference", |proof| {
                 proof.negative_control.differing = 0;
             }),
             ("4 of 5 recorded results", |proof| {
