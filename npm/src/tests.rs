@@ -154,7 +154,7 @@ fn what_cannot_be_done_is_refused_in_words() {
         (
             3,
             json!({"clip": 0, "quantity": "pose", "tension": "soft"}),
-            "tension is `soft`, no number",
+            "tension is `soft`, which is not a number",
         ),
         (
             4,

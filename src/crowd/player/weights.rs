@@ -42,7 +42,7 @@ impl Crowd {
     ///     library.push(&door, method::SLERP, VectorMethod::Linear)?;
     /// }
     /// let mut crowd = Engine::new(Device::Cpu)?.crowd(&library, 100, 2)?;
-    /// crowd.set(7, 1, CrowdLayer { weight: 0.0, ..CrowdLayer::new(1) })?;
+    /// crowd.set(7, 1, CrowdLayer::new(1).with_weight(0.0))?;
     /// let half_a_second = crowd.ticks_of(0.5)? as u64;
     /// crowd.fade(7, 1, 1.0, half_a_second)?;
     /// crowd.advance(0.25)?;
