@@ -111,7 +111,7 @@ fn the_software_drivers_are_proved_and_compared() {
     let compared = run(folder, &["prove", "--compare", "one.json", "other.json"]);
     assert_eq!(compared.code, 8, "{}", compared.words);
     assert!(
-        compared.words.contains("made other bits"),
+        compared.words.contains("gave different bits"),
         "{}",
         compared.words
     );
