@@ -397,6 +397,7 @@ def test_what_a_file_holds_beside_its_clips_is_named_where_it_is_left_out(tmp_pa
     other = tmp_path / "other.gltf"
     scene(other)
     found = said("both.glb", [file["Nod"], tumble.load(other)["Turn"]])
+    assert found.pop(0) == f"{tmp_path / 'both.glb'}: warning[W208]: {lost}"
     assert [text.split(";")[0] for text in found] == [
         f"{path}: warning[W208]: clips of several files make a new file",
         f"{other}: warning[W208]: clips of several files make a new file",
