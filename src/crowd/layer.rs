@@ -44,10 +44,10 @@ pub struct CrowdLayer {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[non_exhaustive]
 pub enum LayerBlend {
-    /// The layers below are interpolated towards the clip.
+    /// The result lies between the layers below and the clip, by the weight.
     #[default]
     Over,
-    /// The clip's difference from its reference pose is added to the layers below.
+    /// The clip's difference from its reference pose is added to the layers below, by the weight.
     Additive,
 }
 

@@ -81,7 +81,7 @@ impl<L: Lanes, const VECTORS: usize> Number for Together<L, VECTORS> {
 }
 
 impl<L: Lanes> Together<L, 2> {
-    /// From the components of two vectors of rotations, `x y z w` each.
+    /// Puts the components of two vectors of rotations together, `x y z w` each.
     #[inline(always)]
     pub(crate) fn of_rotations(a: [L; 4], b: [L; 4]) -> [Self; 4] {
         [
@@ -92,7 +92,7 @@ impl<L: Lanes> Together<L, 2> {
         ]
     }
 
-    /// The components of the two vectors of rotations.
+    /// The inverse of [`Self::of_rotations`]: the components of each vector.
     #[inline(always)]
     pub(crate) fn rotations([x, y, z, w]: [Self; 4]) -> [[L; 4]; 2] {
         [

@@ -1,5 +1,5 @@
-//! Comparison of any buffer with the one that it should be equal to, word by word: matrices, half floats, results frame
-//! by frame, poses of crowds, lists of indices.
+//! Compares any buffer with an expected one, word by word: matrices, half floats, results frame by frame, poses of
+//! crowds, lists of indices.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -10,8 +10,8 @@ use crate::names::names;
 use crate::output::component_type::ComponentType;
 use crate::verify::comparison::Agreement;
 
-/// The word with which a test fills a buffer before its kernel runs, to find words that the kernel did not write. It is
-/// a NaN, and so is each half of it in 16 bits. The engine never writes it.
+/// A test fills a buffer with this word before its kernel runs, and so finds the words that the kernel did not write.
+/// The word is a NaN, and each of its halves is a NaN of 16 bits. The engine never writes it.
 pub const UNWRITTEN: u32 = 0x7fb5_7fb5;
 
 /// The type of the words of a compared buffer.
@@ -53,7 +53,7 @@ impl WordType {
         }
     }
 
-    /// The number that a word's bits mean.
+    /// The number with these bits.
     fn number(self, bits: u32) -> f64 {
         match self {
             Self::F32 => f32::from_bits(bits).into(),
@@ -69,7 +69,7 @@ impl WordType {
         }
     }
 
-    /// The sign's bit, and the bits of the smallest normal number; of floats.
+    /// For floats: the sign's bit, and the bits of the smallest normal number.
     fn layout(self) -> Option<(u32, u32)> {
         match self {
             Self::F32 => Some((1 << 31, 1 << 23)),
@@ -114,13 +114,13 @@ impl WordType {
         }
     }
 
-    /// How many numbers of the type lie from one word to the other.
+    /// How many steps, from number to next number, lead from one word to the other.
     fn steps(self, theirs: u32, expected: u32) -> u64 {
         self.position(theirs).abs_diff(self.position(expected))
     }
 }
 
-/// How a word differs from the expected one. The first kind that applies counts.
+/// How a word differs from the expected one. If several kinds apply, the first of them is used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
@@ -128,23 +128,23 @@ impl WordType {
 pub enum DifferenceKind {
     /// The word is [`UNWRITTEN`]: no invocation wrote it.
     Unwritten,
-    /// One of the two is NaN, or both are with other bits.
+    /// One of the two is NaN, or both are NaN with different bits.
     NotNumber,
     /// One of the two is infinite.
     Infinite,
-    /// +0 and -0.
+    /// One is +0, the other is -0.
     ZeroSign,
     /// One is 0, the other is subnormal: the device flushes small numbers.
     Flushed,
-    /// The same magnitude with the other sign.
+    /// The magnitudes are equal, the signs differ.
     Sign,
     /// One of the two is subnormal.
     Subnormal,
-    /// The next number: a rounding.
+    /// One is the next number after the other: a difference in rounding.
     Neighbour,
-    /// 2 to 16 numbers away.
+    /// The two are 2 to 16 steps apart.
     Near,
-    /// Farther away, or other bits of an integer.
+    /// The two are farther apart, or are different integers.
     Distant,
 }
 
@@ -171,22 +171,23 @@ pub struct WordDifference {
     pub index: usize,
     /// The type of the words.
     pub words: WordType,
-    /// The bits that were found.
+    /// The bits in the compared buffer.
     pub theirs: u32,
-    /// The bits that were expected.
+    /// The bits in the expected buffer.
     pub expected: u32,
-    /// How they differ.
+    /// How the bits differ.
     pub kind: DifferenceKind,
 }
 
 impl WordDifference {
-    /// The number that was found, and the expected one.
+    /// The number in the compared buffer, and the expected number.
     #[must_use]
     pub fn numbers(&self) -> [f64; 2] {
         [self.theirs, self.expected].map(|bits| self.words.number(bits))
     }
 
-    /// The distance of the two numbers; infinite if it is not a number, and for a word that was not written.
+    /// The distance between the two numbers. It is infinite if it cannot be computed (NaN), or if the word was not
+    /// written.
     #[must_use]
     pub fn distance(&self) -> f64 {
         let [theirs, expected] = self.numbers();
@@ -198,8 +199,8 @@ impl WordDifference {
         }
     }
 
-    /// How many numbers of the type lie from one to the other; `u64::MAX` where the [distance](Self::distance) is
-    /// infinite.
+    /// How many steps, from number to next number of the type, lead from one to the other. It is `u64::MAX` if the
+    /// [distance](Self::distance) is infinite.
     #[must_use]
     pub fn steps(&self) -> u64 {
         match self.distance().is_finite() {
@@ -221,13 +222,13 @@ impl fmt::Display for WordDifference {
     }
 }
 
-/// The bound of the differences that [`BufferComparison::agreement_within`] accepts.
+/// The largest difference that [`BufferComparison::agreement_within`] accepts.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum WordBound {
-    /// The largest distance of two numbers.
+    /// The largest distance between two numbers.
     Distance(f64),
-    /// The largest number of steps from one number of the type to the other: 1 for neighbours.
+    /// The largest number of [steps](WordDifference::steps) between two numbers: 1 for neighbours.
     Steps(u64),
 }
 
@@ -242,23 +243,23 @@ pub struct BufferComparison {
     pub words: u64,
     /// The number of words whose bits differ.
     pub differing: u64,
-    /// The differing words by the kind of the difference.
+    /// The number of differing words of each kind.
     pub census: BTreeMap<DifferenceKind, u64>,
     /// The first word that differs.
     pub first_difference: Option<WordDifference>,
-    /// The word with the largest distance from the expected number; the first of them.
+    /// The word with the largest distance from the expected number. If several have it, the first of them.
     pub worst: Option<WordDifference>,
     /// The largest [distance](WordDifference::distance).
     pub max_distance: f64,
     /// The largest number of [steps](WordDifference::steps).
     pub max_steps: u64,
-    /// Whether every word is [`UNWRITTEN`]: the kernel ran nowhere, or wrote to another buffer.
+    /// Whether every word is [`UNWRITTEN`]: the kernel did not run, or wrote to another buffer.
     pub is_unwritten: bool,
 }
 
 impl BufferComparison {
-    /// [`Agreement::SameBits`], [`Agreement::Nothing`] if there are no words or none was written, otherwise
-    /// [`Agreement::OutsideBounds`].
+    /// The agreement without a bound: [`Agreement::Nothing`] if there are no words or none was written,
+    /// [`Agreement::SameBits`] if no word differs, otherwise [`Agreement::OutsideBounds`].
     #[must_use]
     pub fn agreement(&self) -> Agreement {
         match self.differing {
@@ -268,8 +269,9 @@ impl BufferComparison {
         }
     }
 
-    /// As [`BufferComparison::agreement`]; differences up to a bound of your choice are [`Agreement::WithinBounds`].
-    /// NaN, infinities and words that were not written are outside every bound.
+    /// The agreement with a bound of your choice. As [`BufferComparison::agreement`], but the result is
+    /// [`Agreement::WithinBounds`] if no difference is larger than the bound. Differences to NaN, to infinities and to
+    /// words that were not written are outside every bound.
     #[must_use]
     pub fn agreement_within(&self, bound: WordBound) -> Agreement {
         let is_within = self.max_distance.is_finite()
@@ -318,28 +320,28 @@ impl fmt::Display for BufferComparison {
     }
 }
 
-/// Two buffers that are to be compared have other lengths, or no whole words.
+/// The two buffers have different lengths, or do not contain whole words.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error(
     "{theirs} bytes are to be compared with {expected}, as words of {word} bytes; give both buffers the same length, in whole words"
 )]
 #[non_exhaustive]
 pub struct BufferLengthError {
-    /// The bytes of the buffer that is compared.
+    /// The number of bytes in the compared buffer.
     pub theirs: usize,
-    /// The bytes of the expected buffer.
+    /// The number of bytes in the expected buffer.
     pub expected: usize,
-    /// The bytes of a word.
+    /// The number of bytes in a word.
     pub word: usize,
 }
 
-/// Compares a buffer, such as a kernel of yours wrote, with the expected one, word by word. The expected one may come
-/// from the engine ([`Request::evaluate_bytes`](crate::Request::evaluate_bytes) in any layout and encoding,
-/// [`Crowd::evaluate_into`](crate::crowd::Crowd::evaluate_into)), or from anything else. Numbers are in the byte order
-/// of the machine.
+/// Compares a buffer, for example the output of your kernel, with an expected buffer, word by word. The expected buffer
+/// may come from the engine ([`Request::evaluate_bytes`](crate::Request::evaluate_bytes) in any layout and encoding,
+/// [`Crowd::evaluate_into`](crate::crowd::Crowd::evaluate_into)), or from any other source. Numbers are in the byte
+/// order of the machine.
 ///
-/// Fill the buffer with [`UNWRITTEN`] before the kernel runs: a kernel that ran nowhere is then told from one that
-/// passed, and words that it left out are counted.
+/// Fill the buffer with [`UNWRITTEN`] before the kernel runs. Then a kernel that did not run does not pass, and words
+/// that it did not write are counted.
 ///
 /// ```
 /// use tumble::verify::{Agreement, DifferenceKind, WordBound, WordType, compare_buffers};
@@ -355,7 +357,7 @@ pub struct BufferLengthError {
 /// ```
 ///
 /// # Errors
-/// When the buffers have other lengths, or no whole words.
+/// When the buffers have different lengths, or do not contain whole words.
 pub fn compare_buffers<T: NoUninit, U: NoUninit>(
     words: WordType,
     theirs: &[T],

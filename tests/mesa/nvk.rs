@@ -420,7 +420,7 @@ const GOALS: [Goal; 9] = [
 
 impl Goal {
     /// Instructions of a warp for each of its lanes' samples, in runs of so many that begin in the middle of a line. A
-    /// run has eight lanes, and is cut where 16 iterations end.
+    /// run has eight lanes, and is cut after 32 iterations.
     fn instructions(&self, listing: &Listing, samples: usize) -> usize {
         const LANES: usize = 8;
         const IDLE: usize = LANES / 2;

@@ -77,7 +77,7 @@ impl RootMotionArguments {
         }
     }
 
-    /// Refuses options that say how root motion is found, where it is not.
+    /// Refuses the other options of root motion if the root keeps its motion.
     pub(crate) fn check(&self, line: &CommandLine) -> Result<(), Failure> {
         if self.root_motion != RootMotionRule::Keep {
             return Ok(());
@@ -91,7 +91,7 @@ impl RootMotionArguments {
         line.refuse(&all, "roots that keep their motion", remedy)
     }
 
-    /// Refuses a file that is written again, whose root would need channels that it does not have.
+    /// Refuses to write a file again if its root would need new channels.
     pub(crate) fn check_kept(&self, name: &str, clip: &Motion) -> Result<(), Failure> {
         let root = root_joint(clip, &self.options());
         let root = root.map_err(|error| self.failure(name, &error))?;
@@ -105,7 +105,7 @@ impl RootMotionArguments {
         )))
     }
 
-    /// The failure of an input, by its name.
+    /// The failure of the input with this name.
     pub(crate) fn failure(&self, name: &str, error: &dyn std::fmt::Display) -> Failure {
         Failure::new(
             ALL_INPUTS,

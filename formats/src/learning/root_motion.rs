@@ -1,11 +1,11 @@
-//! Root motion: the part of a motion that carries a body over the ground, apart from the motion in place.
+//! Root motion: the part of a motion that carries a body over the ground, without the motion in place.
 
 use glam::{DQuat, DVec3};
 use tumble::names;
 
 use crate::learning::heading::{Ground, forward_heading, twist_heading};
 
-/// The heading of a root.
+/// How the heading of a root is computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum HeadingSource {
     /// Its twist about the axis that points up ([`twist_heading`]).
@@ -13,9 +13,9 @@ pub enum HeadingSource {
     Twist,
     /// The direction of its x axis on the ground ([`forward_heading`]).
     X,
-    /// That of its y axis.
+    /// The direction of its y axis on the ground.
     Y,
-    /// That of its z axis.
+    /// The direction of its z axis on the ground.
     Z,
 }
 
@@ -40,14 +40,14 @@ impl HeadingSource {
     }
 }
 
-/// A motion over the ground: for each frame a place on it and a heading, which together are a pose.
+/// A motion over the ground. Each frame has a pose: a place on the ground and a heading.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RootMotion {
     /// The axis that points up.
     pub ground: Ground,
     /// Places at height 0.
     pub positions: Vec<DVec3>,
-    /// Headings, rad. From frame to frame they change by half a turn at most, and so count whole turns.
+    /// Headings, rad. They change by half a turn at most from frame to frame, so they also count whole turns.
     pub headings: Vec<f64>,
 }
 
@@ -73,7 +73,8 @@ impl GroundStep {
         }
     }
 
-    /// This step so many times, or backwards: by squaring, so that rounding does not grow with the number of times.
+    /// This step, repeated; negative numbers go backwards. The power is computed by squaring, so that rounding errors do
+    /// not grow with the number.
     fn repeated(self, times: i64, ground: Ground) -> Self {
         let mut square = match times < 0 {
             true => Self {
@@ -102,7 +103,7 @@ impl GroundStep {
 }
 
 impl RootMotion {
-    /// The root motion of a body whose root has these poses in the world.
+    /// The root motion of a body. `positions` and `rotations` are the poses of its root in the world.
     #[must_use]
     pub fn of(
         positions: &[DVec3],
@@ -138,7 +139,7 @@ impl RootMotion {
         about_up(self.headings[frame], self.ground)
     }
 
-    /// A pose in the world, without this motion: the body faces heading 0 above the origin.
+    /// Removes this motion from a pose in the world: the body is then above the origin and faces heading 0.
     ///
     /// # Panics
     /// When there is no such frame.
@@ -148,7 +149,7 @@ impl RootMotion {
         (back * (position - self.positions[frame]), back * rotation)
     }
 
-    /// The inverse of [`RootMotion::in_place`], to within 1e-15 of the numbers.
+    /// Adds this motion to a pose: the inverse of [`RootMotion::in_place`], to within 1e-15 of the numbers.
     ///
     /// # Panics
     /// When there is no such frame.
@@ -158,8 +159,8 @@ impl RootMotion {
         (self.positions[frame] + forth * position, forth * rotation)
     }
 
-    /// The motion when it has been played so many times before, each time from where it ended: its last frame is where
-    /// the first one of the next loop is. Negative numbers are loops before it.
+    /// The motion after a number of loops. Each loop begins where the one before ended: the last frame of a loop is the
+    /// first frame of the next one. Negative numbers are loops before this motion.
     #[must_use]
     pub fn after_loops(&self, loops: i64) -> Self {
         let ends = self.positions.first().zip(self.positions.last());

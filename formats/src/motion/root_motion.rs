@@ -1,4 +1,4 @@
-//! Takes the motion over the ground out of a sampled clip: the clip stays in place, or gets a joint that moves it.
+//! Removes the motion over the ground from a sampled clip, or gives it to a new joint that carries the root.
 
 use glam::{DQuat, DVec3, Quat, Vec3};
 use tumble::{Channel, Engine, Error, SampleTimes, TrackError, names};
@@ -12,12 +12,12 @@ use crate::motion::{ChannelInterpolation, Channels, Joint, Motion, Transform, Wr
 /// The treatment of the motion over the ground.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum RootMotionRule {
-    /// The root has it.
+    /// The root keeps it.
     #[default]
     Keep,
-    /// It is left out: the root stays above the origin, and faces heading 0.
+    /// It is removed: the root stays above the origin, and faces heading 0.
     InPlace,
-    /// A new joint has it, [`ROOT_MOTION`], and carries the root. In the world, nothing changes.
+    /// A new joint, [`ROOT_MOTION`], gets it and carries the root. The poses in the world stay the same.
     Extract,
 }
 
@@ -38,24 +38,24 @@ pub struct RootMotionOptions {
     pub ground: Ground,
     /// The heading of the root.
     pub heading: HeadingSource,
-    /// The name of the joint that is the root; by default the one that moves, and whose ancestors do not.
+    /// The name of the root. By default the root is the joint that moves and whose ancestors do not.
     pub joint: Option<String>,
 }
 
-/// Why the motion over the ground cannot be taken out.
+/// Why the motion over the ground cannot be removed from the root.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum RootMotionError {
     /// No joint has translations.
     #[error("no joint has keys of translations, so that nothing moves over the ground")]
     NoRoot,
-    /// Several joints move on their own.
+    /// Several joints move independently of each other.
     #[error("several joints move on their own: {names}; name the root")]
     SeveralRoots {
         /// Their names.
         names: String,
     },
-    /// A name that no joint has.
+    /// No joint has the name in the options.
     #[error("no joint is called `{name}`")]
     NoJoint {
         /// The name.
@@ -112,9 +112,9 @@ impl Similarity {
     }
 }
 
-/// A sampled clip whose motion over the ground is treated by a rule. In place, and carried by [`ROOT_MOTION`], the root
-/// has the same samples. Carried by it, poses in the world differ by the rounding of f32 at most: 3e-7 rad, and 3e-7
-/// of the farthest place.
+/// Applies a rule for the motion over the ground to a sampled clip. By [`RootMotionRule::InPlace`] and by
+/// [`RootMotionRule::Extract`] the root gets the same samples. By `Extract`, poses in the world change by the rounding of
+/// f32 at most: 3e-7 rad, and 3e-7 of the farthest position.
 ///
 /// # Errors
 /// A [`RootMotionError`].
@@ -205,8 +205,8 @@ pub fn track_samples(clip: &Motion, engine: &Engine) -> Result<Samples, Error> {
     ChannelMethods::AUTHORED.sample(engine, clip, &SampleTimes::at(times))
 }
 
-/// A clip with these samples ([`track_samples`]) as the keys of its tracks, whose motion over the ground is treated by a
-/// rule. Its scalars keep their keys; cubic splines become lines.
+/// Applies a rule for the motion over the ground to samples of a clip ([`track_samples`]), and returns a clip with the
+/// results as the keys of its tracks. Scalars keep their keys; cubic splines become lines.
 ///
 /// # Errors
 /// As [`with_root_motion`].
@@ -225,7 +225,7 @@ pub fn keys_with_root_motion(
 }
 
 impl Motion {
-    /// Whether a root has keys of its rotation and its position that can be replaced by others near 0.
+    /// Whether other keys, near 0, can replace the keys of a root's rotation and position.
     #[must_use]
     pub fn root_has_keys(&self, root: usize) -> bool {
         let channels = self.channels.get(root);
@@ -242,7 +242,8 @@ impl Motion {
 /// The joint that moves over the ground.
 ///
 /// # Errors
-/// When there is none, or several and `options` name none.
+/// When no joint has keys of translations, when several joints move independently and `options` name none, or when the
+/// named joint does not exist or has no such keys.
 pub fn root_joint(clip: &Motion, options: &RootMotionOptions) -> Result<usize, RootMotionError> {
     let tracks = 0..clip.set.track_count();
     let keys = |track: usize| clip.set.vector_keys(Channel::Translation, track);
@@ -281,7 +282,7 @@ pub fn root_joint(clip: &Motion, options: &RootMotionOptions) -> Result<usize, R
     }
 }
 
-/// Where the parent of the root is at a sample.
+/// The pose of the root's parent in the world, at a sample.
 fn parent_in_world(
     clip: &Motion,
     samples: &Samples,
@@ -327,7 +328,7 @@ struct Carrier {
 }
 
 impl Carrier {
-    /// The clip with this joint as its first track, between the root and its parent.
+    /// Adds this joint to a clip: as the first track, between the root and its parent.
     fn added(
         self,
         clip: &Motion,
