@@ -272,7 +272,7 @@ fn files_of_people_hold_the_stored_numbers() {
     }
 }
 
-/// DeepMimic's 44 numbers: each joint from its columns, w first, at a rate or at the times that durations lead to.
+/// `DeepMimic`'s 44 numbers: each joint from its columns, w first, at a rate or at the times that durations lead to.
 #[test]
 fn frames_of_deepmimic_are_its_joints() {
     let read = |durations: [f64; 3], width: usize| {

@@ -14,10 +14,7 @@ pub(crate) fn robot(bytes: &[u8]) -> u64 {
             location_is_inside(bytes, &refusal);
             assert!(!refusal.message.is_empty(), "{refusal}");
             assert_eq!(refusal.code.severity(), Severity::Error, "{refusal}");
-            let words = refusal
-                .message
-                .chars()
-                .filter(|it| it.is_ascii_alphabetic());
+            let words = refusal.message.chars().filter(char::is_ascii_alphabetic);
             return signature((refusal.code, words.rev().take(12).collect::<String>()));
         }
     };
