@@ -7,11 +7,13 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
+# Instructions are counted of functions as they are shipped; incremental compilation inlines fewer.
+export CARGO_INCREMENTAL=0
 # Everything is built once from a clean clone: what would make a second build quicker makes the
 # first one slower. Each unit that code is generated in makes the small functions of the others again:
 # four are enough for two cores.
 if [ -n "${CI:-}" ]; then
-    export CARGO_INCREMENTAL=0 CARGO_PROFILE_DEV_DEBUG=0
+    export CARGO_PROFILE_DEV_DEBUG=0
     export CARGO_PROFILE_DEV_CODEGEN_UNITS=4 CARGO_PROFILE_DEV_BUILD_OVERRIDE_CODEGEN_UNITS=4
     export RUSTFLAGS="${RUSTFLAGS:-} -D warnings"
 fi

@@ -76,7 +76,8 @@ fn generate(folder: &Path, keys: u32, motion: &[&str]) -> std::path::PathBuf {
     read
 }
 
-/// Bounds are a quarter above what was counted when they were set.
+/// Bounds are a quarter above what was counted when they were set, without incremental compilation, as in
+/// `scripts/test.sh`: with it fewer functions are inlined.
 #[test]
 fn rotations_and_keys_cost_no_more_than_they_did() {
     let folder = tempfile::tempdir().unwrap();
@@ -84,7 +85,7 @@ fn rotations_and_keys_cost_no_more_than_they_did() {
     let (sparse, many) = (random(26), random(260));
     let has_avx2 = VectorWidth::available().contains(&VectorWidth::Avx2);
     let bounds = [
-        ("baseline", [22.0, 49.0, 53.0], [2650.0, 18_000.0]),
+        ("baseline", [22.0, 49.0, 49.0], [2650.0, 18_000.0]),
         ("avx2", [9.5, 20.0, 20.0], [1300.0, 8700.0]),
     ];
     let methods = ["slerp", "bessel-overhauser", "kochanek-bartels"];
