@@ -136,7 +136,6 @@ impl KeptKeys {
         if cfg!(smallest) {
             return; // no clip keeps keys there
         }
-        let [first, second] = tracks;
         match self.curve {
             KeyCurve::Arcs if output.len() > L::COUNT => {
                 let found = self.on_arcs::<Together<L, 2>>(at, tracks);
@@ -145,12 +144,11 @@ impl KeptKeys {
                 L::store_rotations(of_first, values);
                 store(of_second, rest);
             }
-            KeyCurve::Arcs => store::<L>(self.on_arcs(at, first), output),
+            KeyCurve::Arcs => store::<L>(self.on_arcs(at, &tracks[0]), output),
             _ => {
-                let vectors = output.chunks_mut(L::COUNT);
-                for (tracks, values) in [first, second].into_iter().zip(vectors) {
+                for (tracks, values) in tracks.iter().zip(output.chunks_mut(L::COUNT)) {
                     store::<L>(self.on_cubics(at, tracks), values);
-                    // Those have components of 0, of which one is quickly compared.
+                    // An unresolved value has four components of 0; one of them is quickly compared.
                     if values.iter().any(|value| value[3] == 0.0) {
                         self.resolve(at, tracks, values);
                     }
