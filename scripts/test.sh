@@ -153,9 +153,15 @@ others() {
 start_beside target/others.log others
 start_beside target/python.log ./scripts/python.sh --color=yes
 failed=0
-cargo test --workspace --no-fail-fast --lib --bins --test all || failed=$?
+cargo test --workspace --no-fail-fast --lib --bins --test all 2>&1 | tee target/all.log || failed=$?
 for one in "${beside[@]}"; do
     wait "${one%%:*}" || failed=$?
     cat "${one#*:}"
 done
+if [ "$failed" -ne 0 ]; then
+    # The end of a log is what people see first.
+    echo "these failed (exit $failed):"
+    grep -hE "^test .* FAILED|^thread .* panicked at|^error: |test failed, to rerun|^FAILED |^ERROR " \
+        target/all.log target/others.log target/python.log || echo "no test: see the log"
+fi
 exit "$failed"
