@@ -342,7 +342,7 @@ impl DatKeys {
             Some(previous) => {
                 if dot(*previous, exact).abs() <= HALF_TURN_PRODUCT {
                     let message = format!(
-                        "box {} turns by exactly 180° from the previous key; the signs decide the direction",
+                        "box {} is rotated by exactly 180° from the previous key; the signs decide the direction",
                         index + 1
                     );
                     lines.warn(column, Code::HalfTurn, message);

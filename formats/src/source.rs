@@ -149,7 +149,8 @@ impl Source {
         if same {
             return Ok(());
         }
-        let message = "changed while it was read; read it again when its writer is done";
+        let message =
+            "changed while it was read; try again when the other program has finished writing it";
         Err(Diagnostic::new(&self.name, Code::Changed, message))
     }
 }

@@ -296,7 +296,7 @@ impl fmt::Display for BufferComparison {
         if self.is_unwritten {
             return write!(
                 f,
-                "{kind}: none of {words} words was written: the kernel ran nowhere, or wrote to another buffer"
+                "{kind}: none of the {words} words was written: the kernel did not run, or it wrote to another buffer"
             );
         }
         write!(

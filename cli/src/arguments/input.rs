@@ -758,7 +758,7 @@ fn unreadable(error: &walkdir::Error) -> UnreadableEntry {
     if let Some(ancestor) = error.loop_ancestor() {
         let ancestor = ancestor.display();
         return UnreadableEntry::Skipped(format!(
-            "is a link to {ancestor}, a directory that it is in; not followed"
+            "is a link to {ancestor}, the directory that contains it; not followed"
         ));
     }
     let Some(path) = error.path() else {

@@ -371,7 +371,7 @@ fn root_motion(result: &ResultDescription<'_>) -> Option<String> {
     let has_poses = result.kind.is_clip() || result.kind == ResultKind::Robot;
     (!has_poses).then(|| {
         let name = result.format.name;
-        format!("--root-motion is for files of whole clips, and not for {name} of single numbers; write NPZ, GLB or BVH")
+        format!("--root-motion needs a result that is a clip, and this {name} has only numbers; write NPZ, GLB or BVH")
     })
 }
 

@@ -312,8 +312,9 @@ impl<'a> Pipeline<'a> {
         let start = || thread::Builder::new().spawn(move || reading.read_all(jobs, &hand_over));
         let started = begun.and_then(|()| {
             start().map_err(|error| {
-                let message =
-                    format!("the system refuses a thread: {error}; allow more (ulimit -u)");
+                let message = format!(
+                    "the system refuses to start a thread: {error}; allow more threads (ulimit -u)"
+                );
                 Failure::new(DEVICE, message)
             })
         });

@@ -259,7 +259,7 @@ impl<R: BufRead> Parser<'_, R> {
     /// Reads `CHANNELS count name…`, on one line.
     fn channels(&mut self, keyword: &Word) -> Result<(), Diagnostic> {
         let Some(count) = self.word_before(&AFTER_CHANNELS) else {
-            let message = "CHANNELS without their number; write `CHANNELS 0`".to_owned();
+            let message = "CHANNELS without a number; write `CHANNELS 0`".to_owned();
             return Err(self.refuse(keyword, Code::BvhChannelCount, message));
         };
         let (mut names, mut named) = (Vec::new(), 0usize);

@@ -528,7 +528,12 @@ impl FbxReader<'_> {
                     1 => "1 key lies".to_owned(),
                     count => format!("{count} keys lie"),
                 };
-                (inside(), format!("{keys} outside the take, {begin} to {end} s, and what lies there is left out"))
+                (
+                    inside(),
+                    format!(
+                        "{keys} outside the take ({begin} to {end} s); the motion there is left out"
+                    ),
+                )
             });
         }
         if !takes.others.is_empty() {

@@ -255,8 +255,8 @@ impl RecordedPlan {
         match (1..=inputs.min(MAX_SHARDS)).contains(&shards) {
             true => Ok(Some(recorded)),
             false => Err(refuse(&format!(
-                "it says {shards} shards of {inputs} inputs; each has one at least, and there are \
-                 {MAX_SHARDS} at most; remove it"
+                "it states {shards} shards of {inputs} inputs; a shard has at least one input, and there \
+                 are at most {MAX_SHARDS} shards; remove it"
             ))),
         }
     }

@@ -72,7 +72,7 @@ pub(crate) struct Arguments {
     /// other than rotations, the largest difference of two numbers
     #[arg(long, value_name = "ANGLE", value_parser = degrees, allow_hyphen_values = true)]
     tolerance: Option<f64>,
-    /// The largest distance: that two translations may be apart
+    /// The largest distance: between corresponding translations
     #[arg(long, value_name = "LENGTH", value_parser = not_negative, allow_hyphen_values = true)]
     distance: Option<f64>,
     /// Align the second trajectory to the first by least squares, by these transformations

@@ -558,15 +558,14 @@ impl EvaluationJob<'_> {
         ) = (self.work.input.loaded.document.clone(), self.samples)
         else {
             return Err(Failure::usage(format!(
-                "{name}: the animations of a file that is kept keep their lengths; leave out \
-                 --times, --at, --start, --end and --from-zero (`tumble convert --start` cuts a file first), or \
-                 write another format"
+                "{name}: in a copy of the file, animations keep their lengths; leave out --times, --at, --start, --end \
+                 and --from-zero (`tumble convert --start` cuts a file first), or write another format"
             )));
         };
         if self.arguments.command_line.has("max_gap") {
             return Err(Failure::usage(format!(
-                "{name}: the animations of a file that is kept keep all frames; leave out --max-gap, or write \
-                 another format"
+                "{name}: in a copy of the file, animations keep all frames; leave out --max-gap, or write another \
+                 format"
             )));
         }
         let end_frame = self.arguments.end_frame.for_document(&*document);
@@ -913,8 +912,7 @@ impl EvaluationJob<'_> {
             .map(|parent| Joint { parent, rest })
             .collect();
         if with_parents.has_unplaced_joints() {
-            let message =
-                "joints with a parent have no translations; they are written at their parents";
+            let message = "joints with a parent have no translations; their positions are those of their parents";
             self.work
                 .warn(Diagnostic::new(name, Code::NoOffsets, message));
         }

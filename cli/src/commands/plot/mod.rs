@@ -80,7 +80,8 @@ pub(crate) struct Arguments {
     /// What to draw [default: components; of files of paths, path]
     #[arg(long, value_enum, value_name = "WHAT")]
     show: Option<PlotQuantity>,
-    /// Only these components of rotations: `knee.x`, by the name of a track or its index from 0, and w, x, y or z
+    /// Draw only these components of rotations, such as `knee.x`: a track (its name, or its index from 0) and w, x, y
+    /// or z; `tumble info --json` lists the tracks
     #[arg(
         long,
         value_name = "LIST",

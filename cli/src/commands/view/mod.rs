@@ -103,7 +103,7 @@ pub(crate) struct Arguments {
     /// Where to end, seconds [default: the last key]
     #[arg(long, value_name = "SECONDS", value_parser = finite_seconds, allow_hyphen_values = true)]
     end: Option<f64>,
-    /// Show one input at a time, chosen in a menu, instead of the others as ghosts beside it
+    /// Show one input at a time, chosen in a menu, without the others as ghosts
     #[arg(long)]
     no_ghosts: bool,
     /// Leave the engine and the full keys out of the page: it is smaller, and shows only the requested
