@@ -90,7 +90,7 @@ impl TrackSet {
     /// Reserves memory for `tracks` more tracks with `keys` keys in total, if there is enough, so that the set does
     /// not grow step by step.
     pub fn reserve(&mut self, tracks: usize, keys: usize) {
-        // Where there is too little memory, pushing fails.
+        // If there is too little memory, `push` fails later and reports this.
         let _ = self.tracks.try_reserve(tracks);
         let _ = self.keys.try_reserve(keys);
     }

@@ -394,7 +394,7 @@ impl Memory {
         for invocation in &invocations {
             running.push(Box::pin(main(invocation)));
         }
-        // Each runs to its next barrier in turn.
+        // Each invocation runs to its next barrier, one after another.
         let mut context = Context::from_waker(Waker::noop());
         while !running.is_empty() {
             running.retain_mut(|invocation| invocation.as_mut().poll(&mut context).is_pending());

@@ -259,7 +259,7 @@ impl PhysicalDevice {
         let longest = u64::from(self.max_texel_buffer_elements) * TEXEL_BYTES;
         let can = self.has_int64 && longest >= self.info.max_memory_allocation_size;
         match reads {
-            // Where few storage buffers can be bound, texel buffers count apart.
+            // Some devices can bind few storage buffers, but texel buffers in addition to them.
             Reads::Automatic => {
                 can && (self.info.kind == DeviceKind::Cpu
                     || self.storage_buffers < MAX_STORAGE_BUFFERS)
