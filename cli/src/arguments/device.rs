@@ -408,7 +408,7 @@ pub(crate) fn is_absence(error: &VulkanError) -> bool {
         | VulkanError::NoNvidiaDriver
         | VulkanError::SlowDriver { .. }
         | VulkanError::Driver { .. } => true,
-        // Loaders return this when no driver works.
+        // The Vulkan loader returns this if no driver works.
         VulkanError::Call { result, .. } => *result == vk::Result::ERROR_INITIALIZATION_FAILED,
         _ => false,
     }

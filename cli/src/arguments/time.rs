@@ -434,7 +434,7 @@ impl SampleChoice {
         let mut times: Vec<f64> = resolved(&all.frames, clip, name)?.times(0).collect();
         times.extend(all.end.map(|end| end.at));
         let known = clip.key_times();
-        // The key before a gap.
+        // The key before the gap is held.
         let held = |time: f64| {
             let next = known.partition_point(|&key| key < time);
             let before = known[next.checked_sub(1)?];

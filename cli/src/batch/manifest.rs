@@ -106,7 +106,7 @@ impl PlannedResults {
     ) -> bool {
         let whole = entry.whole().0;
         if self.complete.contains(whole) {
-            // Of a file that had several clips, and has one now.
+            // The file had several clips before and has one now, so the name of its result has changed.
             return entry.output != whole && previous.contains_key(whole);
         }
         match self.names.contains(whole) {
@@ -251,7 +251,7 @@ impl Manifest {
 
     /// Puts the lines in order.
     fn finish(mut self) -> Result<(), Failure> {
-        // Windows replaces no file that is open.
+        // Windows cannot replace a file that is open, so it is closed first.
         self.journal = None;
         self.check_in_place()?;
         let orphans = self.orphans();
@@ -494,9 +494,9 @@ impl ResultRecorder for Manifest {
         let mut inputs = std::mem::take(&mut self.inputs);
         inputs.retain(|_, entry| match InputPresence::of_input(entry) {
             _ if entry.state == InputState::Skipped => false,
-            // A directory that could not be read, or was empty, and can be read now.
+            // A directory that could not be read, or was empty, and now has files.
             _ if has_files(Path::new(&entry.input)) => false,
-            // Its result has another name now.
+            // The result of this input now has another name.
             _ if (entry.result.as_deref())
                 .is_some_and(|result| self.planned.is_renamed(&entry.input, result)) =>
             {

@@ -589,7 +589,7 @@ impl<'a> Pipeline<'a> {
         let entry = outcome.as_ref().err().map(|failure| {
             let result = result.filter(|result| !result.is_empty());
             match failure.message().is_empty() {
-                // A signal: the input has not failed.
+                // A signal stopped the work: the input has not failed.
                 true => InputEntry::pending(path, result.unwrap_or_default()),
                 false => InputEntry::failed(path, result, failure),
             }
@@ -724,7 +724,7 @@ impl BatchRecords<'_> {
             let owner = Owner::from(entry);
             ReplacedOwners::default().check(work.path(), work.target.path(), &owner)?;
         }
-        // Clips of one input may be called as another input is: walk.glb's `Run` and walk.Run.bvh.
+        // The name of a clip may be that of another input: the clip `Run` of walk.glb, and walk.Run.bvh.
         if !self.made.insert(name.to_owned()) {
             let input = names::input(work.path());
             return Err(Failure::usage(format!(

@@ -284,7 +284,7 @@ impl Arguments {
             Ok::<_, Failure>((samples.times, poses.map_err(failed)?))
         };
         let (times, poses) = at(&SampleTimes::rate(rate))?;
-        // Velocities are differences over a part of a frame, inside the clip.
+        // Velocities are differences of samples a 32nd of a frame apart, inside the clip.
         let step = rate.time_of(1) / 64.0;
         let (first, last) = clip.set.time_span().unwrap_or_default();
         let beside = |side: f64| -> Vec<f64> {

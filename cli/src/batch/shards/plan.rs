@@ -238,7 +238,7 @@ impl RecordedPlan {
         };
         let mut bytes = Vec::new();
         let mut open = || {
-            // Files in it are written and removed: it must not be a link.
+            // Files in this folder are written and removed, so it must not be a link.
             parent_beneath(folder, &Self::name())?;
             open_beneath(folder, &Self::name())?
                 .take(MAX_PLAN_BYTES)

@@ -278,7 +278,7 @@ impl Arguments {
         let track = |clip: &Motion, name: &str| {
             let all = || (0..clip.set.track_count()).collect();
             let chosen = self.inputs.tracks.of(clip, name)?.unwrap_or_else(all);
-            // The other tracks of the clip are kept, because the position of a track depends on its ancestors.
+            // Keep all other tracks of the clip, because the position of a track depends on its ancestors.
             let &[track] = &chosen[..] else {
                 let message = format!(
                     "{name}: has {}; a path is one, choose it with --tracks",

@@ -143,7 +143,7 @@ impl EvaluationJob<'_> {
         if kind == ResultKind::Baked {
             return self.bake(name, clips, target);
         }
-        // Writers of clips report themselves which data they cannot store.
+        // Writers of clips themselves report the data that they cannot store.
         if kind != ResultKind::Motion {
             self.warn_of_lost_channels(clips);
         }
@@ -308,7 +308,7 @@ impl EvaluationJob<'_> {
             ("input", name.to_owned()),
         ];
         let sha256 = self.work.input.file.sha256().map(str::to_owned);
-        // The hash is of the bytes that were read, or none.
+        // A file that changed since it was read has another hash, so that is an error.
         self.work.input.file.check_unchanged()?;
         notes.extend(sha256.map(|hash| ("input_sha256", hash)));
         Ok(notes)
@@ -903,7 +903,7 @@ impl EvaluationJob<'_> {
             return Err(refused(message.to_owned()));
         }
         if !clip.has_vectors() {
-            // Tracks without translations are boxes of a chain, which need no skeleton.
+            // Tracks without translations are drawn as boxes of a chain, which need no skeleton.
             return Ok(Cow::Borrowed(clip));
         }
         let rest = Transform::default();

@@ -190,7 +190,7 @@ enum PlotOutput {
 
 /// Says where curves are less smooth than their methods promise.
 fn note_curves(name: &str, clip: &Motion, choices: &[CurveChoice]) {
-    // No file asks for such a method.
+    // Only methods that the user named, because no file states a method that causes these warnings.
     let named = choices.iter().filter_map(|choice| choice.method.0);
     let interpolations = named.map(|method| choices[0].interpolation(method));
     let warnings = interpolations.filter_map(|one| curve_warning(name, clip, &one));

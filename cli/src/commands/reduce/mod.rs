@@ -333,7 +333,7 @@ impl Arguments {
                 ..ends.of(&reduced.clip, None, &[])
             }];
             let mut bytes = Vec::new();
-            // The writer warns of data that cannot be written.
+            // The writer itself warns of data that it cannot store.
             let written = format.map(|format| format.write_clips(&sampled, &options, &mut bytes));
             Ok(written
                 .and_then(Result::ok)
@@ -388,7 +388,7 @@ impl Arguments {
             ("input", name.to_owned()),
             ("tolerance", format!("{}°", self.tolerance)),
         ];
-        // Formats of frames take the keys where every frame has one.
+        // Formats without times need the rate: they can store the keys if every frame has one.
         let has_times = format.supports(Feature::UnevenTimes);
         let rate = |clip: &Motion| clip.rate.filter(|_| !has_times);
         let both = reduced.iter().zip(&samples);

@@ -374,7 +374,7 @@ impl Arguments {
         }
         drop(progress);
         let meshes = self.scenery.read()?;
-        // The animations of a file mostly move one mesh.
+        // The animations of a file usually move the same mesh, so it is stored once.
         let mut skins: Vec<&CarriedMesh> = Vec::new();
         for (one, set) in shown.iter().zip(&mut sets) {
             if let Some(mesh) = &one.mesh {
