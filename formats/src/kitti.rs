@@ -203,7 +203,7 @@ fn read_rows<R: BufRead>(
     let mut rows = [[0.0; 4]; 3];
     let mut after = Vec::new();
     for (index, (column, token)) in tokens(line).enumerate() {
-        // The other numbers may be anything, unless they may be a fourth row.
+        // Further numbers are allowed to be anything. They are parsed because they may be a fourth row.
         let read = match number::parse(token) {
             Ok(read) => read.value,
             Err(_) if index >= NUMBERS => f64::NAN,
@@ -343,7 +343,8 @@ mod tests {
             ),
             Code::KittiPose
         );
-        // A frame's number before the matrix, as KITTI-360 has it: the numbers read as a matrix are no rotation.
+        // A frame number before the matrix, as in KITTI-360. If it is read as part of the matrix, this is not a
+        // rotation.
         assert_eq!(
             refused("7 1 0 0 1.5 0 1 0 -2 0 0 1 3\n", &options),
             Code::NoRotation
@@ -435,7 +436,7 @@ mod tests {
         let again = &read(matrices, seconds).unwrap().clips[0];
         assert_eq!(again.set.track(0).times, clip.set.track(0).times);
         assert_eq!(again.set.track(0).keys, clip.set.track(0).keys);
-        // Without a file of times such poses cannot be read.
+        // Without a file of times, poses at uneven times cannot be read again.
         let refused = write(clip, &MotionOptions::default());
         assert!(matches!(refused, Err(WriteError::Refused(fault)) if fault.code == Code::TumWrite));
         let code = |poses: &str, times: &str| read(poses, times).unwrap_err().code;

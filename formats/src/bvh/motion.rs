@@ -116,7 +116,7 @@ impl FrameKeys {
         lines: &Lines<R>,
         hierarchy: &Hierarchy,
     ) -> Result<Motion, Diagnostic> {
-        // Without frames every track has one key, at time 0.
+        // If there are no frames, every track gets one key, at time 0.
         let count = self.count.max(1);
         let times: Vec<f64> = (0..count as u64)
             .map(|frame| self.rate.time_of(frame))

@@ -272,7 +272,7 @@ fn frames_of_deepmimic(
         *end += duration;
         Some(start)
     });
-    // The rate, or the times where frames last differently.
+    // The rate, or the times if frames have different durations.
     let clock = match is_even {
         true => ("fps".to_owned(), Vec::new(), vec![1.0 / durations[0]]),
         false => ("times".to_owned(), vec![count], times.collect()),

@@ -354,7 +354,7 @@ fn animation<'a>(
             }
         }
     }
-    // An animation has a channel at least, and lasts as long as its channels.
+    // An animation needs at least one channel; its length is that of its channels.
     if channels.is_empty() {
         channels.push((0, Property::Rotation, "LINEAR"));
     }

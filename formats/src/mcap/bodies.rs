@@ -136,7 +136,7 @@ fn resolve_stamps(bodies: &mut [Body<'_>]) {
                     .iter_mut()
                     .for_each(|pose| pose.time = pose.logged);
             }
-            // Others in its topic have stamps.
+            // All stamps of this transform are 0, but others in its topic have stamps: it is static.
             _ if all_zero && body.frames.is_some() => body.kind = BodyKind::Static,
             _ => {
                 let mut stamps = body.poses.iter().filter(|pose| pose.time != 0);
@@ -281,7 +281,7 @@ pub(super) fn into_loaded(
         ..Motion::default()
     };
     if !options.raw_times {
-        // Nothing follows from the times of transforms that stay.
+        // The times of static transforms have no meaning, so they do not determine the rate.
         let mut timed: Vec<&mut BodyKeys> = all
             .iter_mut()
             .filter(|keys| keys.kind != BodyKind::Static)

@@ -264,7 +264,7 @@ impl<'a> Records<'a> {
                     (self.chunk, self.chunk_offset, self.chunk_at) = (chunk, offset, 0);
                     self.borrowed = Some(borrowed);
                 }
-                // An index and a summary follow; they only repeat the channels.
+                // The rest of the file is an index and a summary, which only repeat the channels.
                 DATA_END if !in_chunk => {
                     self.at = self.bytes.len();
                     self.is_complete = true;

@@ -155,7 +155,7 @@ fn part(
     check_float(archive, member)?;
     let header = archive.header(member)?;
     let (mut shape, mut strides) = (header.shape.clone(), header.strides());
-    // The rows of a matrix may be an axis apart, if one follows the other in memory.
+    // A matrix may be stored in two axes, if its rows follow each other in memory.
     if values == KeyKind::Form(RotationForm::Matrix)
         && let [.., 3, 3] = shape[..]
         && let [.., rows, columns] = strides[..]

@@ -105,7 +105,7 @@ fn check_compression(name: &str, path: &str, found: Compression) -> Result<(), D
         | Compression::ZSTD(_) => Ok(()),
         other => {
             let found = other.to_string();
-            // Its level is written behind it.
+            // The text of a compression may contain its level in parentheses, which is cut off.
             let found = found.split('(').next().unwrap_or_default();
             let message = format!(
                 "column `{path}` is compressed by {found}; write it with snappy, zstd or LZ4"
@@ -197,7 +197,7 @@ mod tests {
         for end in 0..18 {
             assert!(page(&HEADER[..end]).is_none(), "{end}");
         }
-        // A list of 2^60 structs; structs in structs; a string beyond the end.
+        // A list of 2^60 structs, structs in structs, and a string that ends beyond the data.
         let list = [
             0x19, 0xfc, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0x0f, 0x00,
         ];

@@ -20,7 +20,7 @@ pub(super) fn check_schema(metadata: &[u8]) -> Result<(), String> {
             continue;
         }
         let (count, kind) = input.list().ok_or_else(damaged)?;
-        // How many of the columns of each open group are still to come.
+        // The number of columns that are still missing in each open group.
         let mut open: Vec<u64> = Vec::new();
         for read in 1..=count {
             let columns = columns_of(&mut input, kind).ok_or_else(damaged)?;

@@ -59,7 +59,7 @@ impl TimeSource {
     pub(crate) fn column(self) -> usize {
         match self {
             Self::Times(column) | Self::Frames(column, _) => column,
-            // Any cell leads to the row.
+            // The error is about a row, so any column will do.
             Self::Rows(_) => 0,
         }
     }

@@ -128,7 +128,7 @@ impl Machine<'_> {
             return Err(self.damaged(message));
         }
         Ok(match (&*shape, items) {
-            // `numpy.save` of a dict and the like.
+            // An array of one object, as `numpy.save` stores a dict: only the object is kept.
             ([], &[only]) => Node::Same(only),
             _ => Node::Same(data),
         })
@@ -257,7 +257,7 @@ impl Machine<'_> {
     pub(in crate::pickle) fn build_chumpy(&self, state: NodeId) -> Result<Node, Diagnostic> {
         Ok(match self.get(state, "x") {
             Some(values) => Node::Same(values),
-            // A formula.
+            // Without `x`, the object is a formula of chumpy, which is not evaluated.
             None => Node::Inert(Box::new(Inert {
                 class: ClassName {
                     module: "chumpy.ch".to_owned(),
