@@ -71,7 +71,7 @@ impl EvaluationKeywords {
                 "end" => end = Some(arrays::number(&value, "end", "seconds")?),
                 "method" => request.method = method_named(&text(&value, "method")?)?,
                 "ends" => request.options.ends = Some(ends(&value)?),
-                // Times outside can be left out, too, which the engine does not do.
+                // In Python, times outside the keys can also be left out, which the engine does not support.
                 "before" => request.outside.before = option_of(&value, "before")?,
                 "after" => request.outside.after = option_of(&value, "after")?,
                 _ => match InterpolationOption::named(&name) {

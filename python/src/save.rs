@@ -376,7 +376,7 @@ impl Save {
         }
         let sources = || self.clips.iter().filter_map(|clip| clip.source.as_ref());
         let is_changed = sources().any(|source| source.is_changed);
-        // All clips of a file as they are: everything stays.
+        // All clips of a file, unchanged: the whole file is copied.
         let is_whole = sources()
             .next()
             .is_some_and(|source| source.clips == self.clips.len());
