@@ -45,11 +45,11 @@ fn vertical() -> impl TypedValueParser<Value = Ground> {
 
 fn rule() -> impl TypedValueParser<Value = RootMotionRule> {
     let help = |rule| match rule {
-        RootMotionRule::Keep => "the root has it",
+        RootMotionRule::Keep => "the root keeps it, as in the input",
         RootMotionRule::InPlace => {
             "left out: the root stays above the origin and faces one direction"
         }
-        RootMotionRule::Extract => "a new joint, root_motion, has it and carries the root",
+        RootMotionRule::Extract => "it moves to a new joint, root_motion, the parent of the root",
     };
     one_of(RootMotionRule::ALL.map(|rule| (rule.name(), help(rule), rule)))
 }

@@ -507,7 +507,7 @@ impl<'a> Pipeline<'a> {
         let kept = batch.previous.results_of(target.name());
         let records = kept.map(|entry| KeptResult {
             state: "kept",
-            input: names::input(path),
+            input: names::recorded(path),
             output: folder.join(&entry.output).display().to_string(),
             frames: &entry.frames,
         });
@@ -647,7 +647,7 @@ fn records_of(
 ) -> Vec<Value> {
     let base = json!({
         "state": "made",
-        "input": names::input(work.path()),
+        "input": names::recorded(work.path()),
         "animation": work.animation(),
         "output": work.target.path().display().to_string(),
         "bytes_before": bytes_before,
@@ -738,7 +738,7 @@ impl BatchRecords<'_> {
             output: name.to_owned(),
             output_bytes: result.written.bytes,
             output_sha256: digest.finish(),
-            input: work.path().display().to_string(),
+            input: names::recorded(work.path()),
             input_sha256: work.input.file.sha256().map(str::to_owned),
             options: self.options.text.clone(),
             option_files: self.options.files.clone(),

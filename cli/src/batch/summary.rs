@@ -126,9 +126,10 @@ impl BatchSummary {
                 warnings,
                 first,
             } => format!("{first} (and {} more: --verbose lists them)", warnings - 1),
-            WarnedInputs { inputs, .. } => {
-                format!("{code} {inputs} files: {} {MORE}", code.title())
-            }
+            WarnedInputs { inputs, first, .. } => format!(
+                "{code} {inputs} files: {}; the first: {first} {MORE}",
+                code.title()
+            ),
         });
         let failed = self.failures.iter().map(|(code, of_code)| {
             let FailedInputs { count, first } = of_code;
