@@ -369,6 +369,7 @@ codes! {
     OtherRobot = "W914" elsewhere, "bodies that are not where their joints put them", "The poses of bodies in the file differ from those that follow from its joints and the robot of `--robot`. The file may belong to another version of the robot. Bodies are computed from the joints.";
     AngleJumps = "W915" elsewhere, "angles that jump by more than half a turn", "Between two keys an angle changes by more than half a turn. The program that wrote the file may have wrapped angles to one turn. The angle is interpolated as stored, the long way around. `--robot` unwraps hinges without limits; otherwise unwrap the angles first (numpy.unwrap).";
     FollowingJoints = "W916" elsewhere, "joints that follow others", "The robot's file says that the joint follows another (`mimic`): its value is that of the other joint times a factor plus an offset. It is computed, and the file's values of it are not used; the message says how far they are from the computed ones.";
+    RotationsDropped = "W917" elsewhere, "rotations of joints that are lost", "Joints of the input move, and no joint of the target follows them: `tumble retarget` pairs the parts of the body, and other joints that have the same name and the same joints above them. `--bones` pairs further joints by name.";
 }
 
 impl Code {

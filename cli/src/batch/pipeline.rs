@@ -734,6 +734,7 @@ impl BatchRecords<'_> {
         let bytes = result.written.bytes;
         let digest = result.written.digest.take().unwrap_or_default();
         let clips = work.input.loaded.clips.len();
+        let assumed_fps = result.frames.assumed_fps.clone();
         let entry = ManifestEntry {
             output: name.to_owned(),
             output_bytes: result.written.bytes,
@@ -754,7 +755,8 @@ impl BatchRecords<'_> {
             self.made.remove(name);
         })?;
         self.progress.add_bytes(bytes);
-        if let Some(line) = self.summary.result(&result.message) {
+        let assumed = assumed_fps.as_deref();
+        if let Some(line) = self.summary.result(&result.message, assumed) {
             self.records.tell(line);
         }
         Ok(())
