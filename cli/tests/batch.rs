@@ -609,7 +609,7 @@ fn a_long_batch_prints_at_most_a_screen() {
     let lines = made.words.lines().count();
     assert!(lines <= 16, "{lines}: {}", made.words);
     let said = [
-        "W012 30 files: neighbouring keys 180° apart (--verbose lists them)",
+        "W012 30 files: neighbouring keys 180° apart; the first: walks/0.dat:",
         "E020 20 more files: the wrong number of columns; the first: ",
         "30 results made, 30 inputs failed; listed in out/manifest.jsonl",
     ];

@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use crate::rate::{Precision, last_digit_power, whole_power};
+
 /// Units of this type in a second.
 const SECOND: i128 = 10i128.pow(SECOND_DECIMALS);
 const SECOND_DECIMALS: u32 = 24;
@@ -43,6 +45,37 @@ pub(crate) fn time_text(whole: i64, time: f64) -> String {
         None => (whole as f64 + time).to_string(),
     }
 }
+
+/// Number of decimals in seconds of a number in a unit of `10^power` seconds. Digits after those that an f64 has do
+/// not count where they are those of an f64: `numpy.savetxt` prints 18 decimals of any number, and 1700000000.05
+/// becomes 1700000000.049999952….
+pub(crate) fn decimal_count(token: &str, power: i32) -> u32 {
+    let last = last_digit_power(token);
+    let exact = f64_power(token, last).unwrap_or(last);
+    exact.saturating_add(power).min(0).unsigned_abs()
+}
+
+/// The power of ten of the last digit that the f64 of a number determines, if the number has more digits and they are
+/// those of this f64. `last` is the power of its last digit.
+fn f64_power(token: &str, last: i32) -> Option<i32> {
+    let mantissa = token.split(['e', 'E']).next().unwrap_or_default();
+    let digits = mantissa.bytes().filter(u8::is_ascii_digit);
+    let significant = digits.skip_while(|&digit| digit == b'0').count();
+    if significant <= F64_DIGITS || last >= 0 {
+        return None;
+    }
+    let value: f64 = token.parse().ok()?;
+    let decimals = usize::try_from(last.unsigned_abs()).ok()?.min(400);
+    let printed = format!("{value:.decimals$}");
+    if Decimal::parse(&printed)? != Decimal::parse(token)? {
+        return None;
+    }
+    let step = Precision::F64.ulp(value);
+    (last..0).find(|&power| step <= whole_power(10.0, power))
+}
+
+/// The most digits that an f64 needs.
+const F64_DIGITS: usize = 17;
 
 impl Decimal {
     /// Parses a number as [`parse`](crate::text::number::parse) does, without digits after the 24th decimal. `None`
@@ -170,6 +203,21 @@ mod tests {
             (0, 1.0 / 3.0, "0.3333333333333333"),
         ] {
             assert_eq!(time_text(whole, time), text);
+        }
+    }
+
+    #[test]
+    fn digits_after_those_of_an_f64_do_not_count() {
+        for (token, power, count) in [
+            ("1.700000000049999952e+09", 0, 6),
+            ("1.700000000000000000e+09", 0, 6),
+            ("1700000000.123456789", 0, 9),
+            ("1700000000123456789", -9, 9),
+            ("1.700000000050000000e+12", -3, 3),
+            ("1.000000000000000056e-01", 0, 16),
+            ("1305031098.6659", 0, 4),
+        ] {
+            assert_eq!(decimal_count(token, power), count, "{token}");
         }
     }
 

@@ -170,7 +170,7 @@ codes! {
     TooLarge = "E023", "too large for f32", "Keys are kept in f32, whose largest value is 3.4e38.";
     TokenTooLong = "E024", "a number is too long", "No number needs more than 64 characters.";
     Norm = "E025", "not a unit quaternion", "A rotation is a quaternion of norm 1. Norms within 0.1 of 1 are normalised. Other norms are probably a mistake, such as a missing column.";
-    TimeNotIncreasing = "E026", "times do not increase", "Key times must increase strictly from line to line. The times of samples (`--times`) must increase too if a clip is written.";
+    TimeNotIncreasing = "E026", "times do not increase", "Key times must increase strictly from line to line. If the lines are only out of order, sort them by time: `sort -g -k 1,1 FILE`, or `sort -g -t , -k 1,1 FILE` for columns with commas. If the clock was set back, the file has two recordings. The times of samples (`--times`) must increase too if a clip is written.";
     KeyNorm = "E027", "no rotation", "The norm of a key's quaternion is below 1e-6, so it does not determine a rotation.";
     EqualTimes = "E028", "two keys at one time", "Two keys at the same time have different values. `--duplicates first` or `last` keeps one of them, `both` makes a jump.";
     LargeSeconds = "E029" elsewhere, "times too large for seconds", "In CSV, Parquet, Arrow and TUM files and in KITTI's files of times, such large numbers are read as milliseconds, microseconds or nanoseconds since 1970 (W305). So they are not written to these formats. `--time-unit` states the unit of the input's times.";
@@ -334,6 +334,7 @@ codes! {
     FrameTimeRounded = "W211", "a frame time of few digits", "A frame time such as 0.033 is probably that of a usual rate, 30 frames a second, rounded to few digits. With this rate the clip is longer or shorter by more than 0.5 %. `--raw-times` keeps the frame time as written, `--override-fps` replaces it.";
     OffsetsReplaced = "W212" elsewhere, "offsets in the file are replaced", "The file has offsets of its joints, and `--offsets` or `--body-model` gives others. Leave the option out to keep those of the file.";
     OtherSpace = "W213" elsewhere, "another unit or up axis than the format's", "glTF is in metres with y up. The input states another unit or up axis, and the clip was not converted. So it lies on its side, or is too large or too small. `--up-axis y --scale metres` converts it.";
+    NoPositions = "W214" elsewhere, "a trajectory without positions", "The clip has only rotations, but a trajectory has a position for each of them. 0 0 0 is written for all poses.";
     UnknownBody = "W301", "a body of an unknown number of joints", "SMPL has 24 joints, SMPL-H 52, SMPL-X 55; 22 are common to them. Bodies with another number are read without names and parents.";
     LeftOut = "W302" elsewhere, "arrays that are left out", "They have an entry for each frame of the input, and it is not known how to interpolate them: `--linear NAME`, in Python `linear=[NAME]`, interpolates them linearly.";
     ObjectsBeside = "W303", "pickled Python objects in addition to the keys", "The keys are in other arrays, so these objects are not read. If the file is written in the same layout, they are copied, unless they have an entry for each frame.";
@@ -367,6 +368,8 @@ codes! {
     RestingJoints = "W913" elsewhere, "joints without keys", "The robot of `--robot` has joints for which the file has no values. They stay where the robot's file has them.";
     OtherRobot = "W914" elsewhere, "bodies that are not where their joints put them", "The poses of bodies in the file differ from those that follow from its joints and the robot of `--robot`. The file may belong to another version of the robot. Bodies are computed from the joints.";
     AngleJumps = "W915" elsewhere, "angles that jump by more than half a turn", "Between two keys an angle changes by more than half a turn. The program that wrote the file may have wrapped angles to one turn. The angle is interpolated as stored, the long way around. `--robot` unwraps hinges without limits; otherwise unwrap the angles first (numpy.unwrap).";
+    FollowingJoints = "W916" elsewhere, "joints that follow others", "In the robot's file, the joint follows another joint (`mimic`): its value is that of the other joint times a factor, plus an offset. This value is computed and used instead of the values in the file; the message has the largest difference between both.";
+    RotationsDropped = "W917" elsewhere, "rotations of joints that are lost", "Joints of the input move, but no joint of the target follows them. `tumble retarget` pairs the parts of the body, and other joints with the same name and the same joints above them. `--bones` pairs further joints by name.";
 }
 
 impl Code {

@@ -9,7 +9,7 @@ use std::path::Path;
 use glam::{DMat3, DQuat, DVec3};
 use tumble::FrameRate;
 
-use crate::decimal::Decimal;
+use crate::decimal::{Decimal, decimal_count};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::feature::Feature;
 use crate::format::{
@@ -22,7 +22,7 @@ use crate::source::Source;
 use crate::text::lines::{Lines, tokens};
 use crate::text::number;
 use crate::times::FrameTimes;
-use crate::tum::{Trajectory, TrajectoryPoses, decimal_count};
+use crate::tum::{Trajectory, TrajectoryPoses};
 
 /// The KITTI format: the path of one body, without times.
 pub static FORMAT: Format = Format {
@@ -243,7 +243,7 @@ fn write_motion(
     out: &mut dyn Write,
 ) -> Result<Vec<Diagnostic>, WriteError> {
     let path = Trajectory::of(clips, options)?;
-    let mut warnings = Vec::new();
+    let mut warnings: Vec<Diagnostic> = path.no_positions().into_iter().collect();
     if !options.times_apart {
         let times = path.sampled.times;
         let is_frame = |rate: FrameRate, (frame, &time): (usize, &f64)| {

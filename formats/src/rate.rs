@@ -1,7 +1,7 @@
 //! Finds the rate of a file's keys from its times as they are written: [`of`]. Times are seldom whole frames: they
-//! were rounded to f32 or to some decimals, or are multiples of a rounded period. The largest error of each rounding
-//! is known. Therefore all rates are tested, and a list of common rates only decides between several that a few
-//! digits leave open.
+//! were rounded to f32 or to some decimals, are multiples of a rounded period, or were added up in f32. The largest
+//! error of each rounding is known, and a sum can be computed again, bit for bit. Therefore all rates are tested. A list
+//! of usual rates only decides if times with few digits agree with several.
 //!
 //! The table in `docs/formats.md` is the test of this module.
 
@@ -20,7 +20,7 @@ pub(crate) enum Precision {
 
 /// A power with an integer exponent, by squaring. It has the same bits everywhere, which `f64::powi` does not
 /// promise; these bits determine the rate that is found.
-fn whole_power(base: f64, exponent: i32) -> f64 {
+pub(crate) fn whole_power(base: f64, exponent: i32) -> f64 {
     let (mut rest, mut square, mut power) = (exponent.unsigned_abs(), base, 1.0);
     while rest > 0 {
         if rest & 1 == 1 {
@@ -328,6 +328,10 @@ fn of_times(lists: &[Vec<f64>], precision: Precision) -> Option<FrameGrid> {
         return None;
     }
     let found = of_distinct(&times, precision);
+    let is_rate = found.is_some_and(|found| found.is_rate);
+    if precision == Precision::F32 && !is_rate {
+        return summed(&times).or(found);
+    }
     let Precision::Decimals(_) = precision else {
         return found;
     };
@@ -338,6 +342,39 @@ fn of_times(lists: &[Vec<f64>], precision: Precision) -> Option<FrameGrid> {
         half <= 1e-7 && times.iter().all(digits)
     };
     found.or_else(|| are_f32().then(|| of_distinct(&times, Precision::F32))?)
+}
+
+/// The rate whose frame time, added up in f32 from the first time on, gives exactly these times: some exporters do so,
+/// and after some seconds the sums are further from the frames than rounding explains.
+fn summed(times: &[f64]) -> Option<FrameGrid> {
+    let (first, last) = (times[0], times[times.len() - 1]);
+    let mean = (times.len() - 1) as f64 / (last - first);
+    let whole = mean.round();
+    let ntsc = (mean * 1.001).round();
+    let rates = [(whole, 1, 1), (ntsc, 1000, 1001)].map(|(number, frames, seconds)| {
+        let is_searched = (1.0..=MAX_RATE).contains(&number);
+        is_searched.then(|| FrameRate::new(number as u64 * frames, seconds).ok())?
+    });
+    let gives_times = |rate: &FrameRate| {
+        let period = rate.time_of(1) as f32;
+        let sums = std::iter::successors(Some(first as f32), |sum| Some(sum + period));
+        let is_near = |(frame, time): (usize, f64)| {
+            let exact = first + rate.time_of(frame as u64);
+            (time - exact).abs() < 0.25 * rate.time_of(1)
+        };
+        let are_sums = times
+            .iter()
+            .zip(sums)
+            .all(|(&time, sum)| time == f64::from(sum));
+        are_sums && times.iter().copied().enumerate().all(is_near)
+    };
+    let grid = rates.into_iter().flatten().find(gives_times)?;
+    let is_at_zero = on_frames(std::iter::once(first), grid, 0.0, Precision::F32);
+    Some(FrameGrid {
+        grid,
+        phase: if is_at_zero { 0.0 } else { first },
+        is_rate: true,
+    })
 }
 
 /// The rate of increasing times.

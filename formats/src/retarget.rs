@@ -11,6 +11,7 @@ mod roles;
 use std::path::Path;
 
 use glam::{DMat3, DQuat, DVec3};
+use tumble::reference::angle_between;
 use tumble::{TrackError, names};
 
 pub use roles::{Role, Roles, recognise};
@@ -80,6 +81,8 @@ pub struct RetargetReport {
     pub resting: Vec<String>,
     /// Joints of the source that nothing follows.
     pub dropped: Vec<String>,
+    /// Of these, the joint that rotates furthest from where it rests, and how far, in degrees; `None` if all rest.
+    pub furthest_dropped: Option<(String, f64)>,
     /// By how many degrees the rest pose of each joint of the target was aligned, where it was.
     pub aligned: Vec<(String, f64)>,
     /// The factor by which the translations of the hips were multiplied.
@@ -280,7 +283,7 @@ pub fn retarget(
     }
     let roles = [&from, &to].map(|rig| recognise(&rig.names, &rig.parents));
     let pairs = match &options.bones[..] {
-        [] => Pairs::by_roles(&to, &roles)?,
+        [] => Pairs::by_roles(&from, &to, &roles)?,
         bones => Pairs::by_names(&from, &to, bones)?,
     };
     let [from_roles, to_roles] = roles.map(Result::ok);
@@ -392,6 +395,17 @@ pub fn retarget(
             (angle > 1e-9).then(|| (to.names[joint].clone(), angle.to_degrees()))
         });
     let used = |joint: &usize| pairs.source_of.contains(&Some(*joint));
+    let furthest = |joint: usize| {
+        let rest = source.skeleton[joint].rest.rotation.as_dquat().normalize();
+        let samples = 0..samples.times.len();
+        let angles = samples.map(|sample| angle_between(local(sample, joint).0, rest));
+        angles.fold(0.0, f64::max).to_degrees()
+    };
+    let furthest_dropped = (0..joints)
+        .filter(|joint| !used(joint))
+        .map(|joint| (from.names[joint].clone(), furthest(joint)))
+        .max_by(|(_, one), (_, other)| one.total_cmp(other))
+        .filter(|(_, angle)| *angle > RESTS);
     let report = RetargetReport {
         pairs: pairs.named(&from, &to),
         resting: (0..to.names.len())
@@ -402,6 +416,7 @@ pub fn retarget(
             .filter(|joint| !used(joint))
             .map(|joint| from.names[joint].clone())
             .collect(),
+        furthest_dropped,
         aligned: aligned.collect(),
         scale,
         axes,
@@ -413,6 +428,9 @@ pub fn retarget(
     };
     Ok((motion, report))
 }
+
+/// The rotation of a joint that rests, in degrees, at most: that of rounded keys.
+const RESTS: f64 = 0.01;
 
 /// Where the joints of the target are with these rotations in the world, and the hips at this position in their parent.
 fn posed(to: &Rig<'_>, world: &[DQuat], hips: Option<(DVec3, (usize, usize))>) -> Pose {
@@ -545,8 +563,9 @@ impl Pairs {
         Self { source_of, hips }
     }
 
-    /// The joints of both skeletons that have one role.
+    /// The joints of both skeletons that have one role, and those without a role that have one name below partners.
     fn by_roles(
+        from: &Rig<'_>,
         to: &Rig<'_>,
         [from_roles, to_roles]: &[Result<Roles, Vec<&'static str>>; 2],
     ) -> Result<Self, RetargetError> {
@@ -566,7 +585,35 @@ impl Pairs {
                 source_of[joint] = from_roles.joint(role);
             }
         }
-        Ok(Self::new(to, source_of))
+        let mut pairs = Self::new(to, source_of);
+        // From the root on, so that fingers below a thumb find their partners too.
+        for &joint in &to.order {
+            let is_only = |rig: &Rig<'_>, name: &String| {
+                rig.names.iter().filter(|other| *other == name).count() == 1
+            };
+            let name = &to.names[joint];
+            let partner = from.named(name).filter(|partner| {
+                let above = pairs
+                    .above(to, joint)
+                    .and_then(|above| pairs.source_of[above]);
+                let is_used = pairs.source_of.contains(&Some(*partner));
+                !is_used && above.is_some() && above == pairs.used_above(from, *partner)
+            });
+            let is_free = pairs.source_of[joint].is_none();
+            if is_free && is_only(to, name) && is_only(from, name) {
+                pairs.source_of[joint] = partner;
+            }
+        }
+        Ok(pairs)
+    }
+
+    /// The nearest joint above one of the source that a joint of the target follows.
+    fn used_above(&self, from: &Rig<'_>, joint: usize) -> Option<usize> {
+        let mut above = from.parents[joint];
+        while let Some(next) = above.filter(|next| !self.source_of.contains(&Some(*next))) {
+            above = from.parents[next];
+        }
+        above
     }
 
     /// The joints of `bones`: names of the target's and of the source's.

@@ -8,7 +8,7 @@ use std::path::Path;
 use glam::{DQuat, DVec3, Quat};
 use tumble::{TrackError, TrackSet};
 
-use crate::decimal::{Decimal, offset_of};
+use crate::decimal::{Decimal, decimal_count, offset_of};
 use crate::diagnostic::{Code, Diagnostic, Location};
 use crate::feature::Feature;
 use crate::format::{
@@ -19,7 +19,7 @@ use crate::motion::keys::{Origin, select};
 use crate::motion::{Joint, Motion, SampledClip, Transform};
 use crate::names::TRAJECTORY_TRACK;
 use crate::quaternion::ComponentOrder;
-use crate::rate::{Precision, last_digit_power};
+use crate::rate::Precision;
 use crate::source::Source;
 use crate::text::lines::{Lines, tokens};
 use crate::text::number;
@@ -342,14 +342,6 @@ impl TrajectoryPoses {
     }
 }
 
-/// Number of decimals in seconds of a number in a unit of `10^power` seconds.
-pub(crate) fn decimal_count(token: &str, power: i32) -> u32 {
-    last_digit_power(token)
-        .saturating_add(power)
-        .min(0)
-        .unsigned_abs()
-}
-
 /// Whether commas seem to be decimal commas: there are commas within numbers that blanks separate.
 fn has_decimal_commas(line: &str) -> bool {
     let mut words = line.split_whitespace();
@@ -385,6 +377,14 @@ impl<'a> Trajectory<'a> {
 
     pub(crate) fn refuse(&self, message: String) -> WriteError {
         Diagnostic::new(&self.options.name, Code::TumWrite, message).into()
+    }
+
+    /// The warning about a clip whose positions are not known.
+    pub(crate) fn no_positions(&self) -> Option<Diagnostic> {
+        let is_placed =
+            !self.sampled.translations.is_empty() || !self.sampled.clip.skeleton.is_empty();
+        let message = "the clip has no positions; 0 0 0 is written for all poses".to_owned();
+        (!is_placed).then(|| Diagnostic::new(&self.options.name, Code::NoPositions, message))
     }
 
     /// The rotation of a sample, and its position as text.
@@ -435,5 +435,5 @@ fn write_motion(
         text.clear();
     }
     out.write_all(text.as_bytes())?;
-    Ok(Vec::new())
+    Ok(path.no_positions().into_iter().collect())
 }

@@ -30,7 +30,8 @@ use crate::run::interruptible;
 ///
 /// Rotations away from the rest pose are the same in the world. Times are the source's. Joints without a partner keep
 /// their rest rotations, and translations of others than the hips are lost. The report is a dict: `pairs`, `resting`,
-/// `dropped`, `aligned` (degrees by joint), `scale`, `axes`, `axes_assumed`, `dropped_translation`, `largest_difference`
+/// `dropped`, `furthest_dropped` (the one of these that rotates furthest from its rest, and the degrees, or None),
+/// `aligned` (degrees by joint), `scale`, `axes`, `axes_assumed`, `dropped_translation`, `largest_difference`
 /// (rad, of rounding), `ends` (how far hands and feet come away from the source's, in heights of the hips), `below_ground`.
 ///
 /// >>> import tumble
@@ -118,6 +119,7 @@ fn report_of<'py>(py: Python<'py>, report: &RetargetReport) -> PyResult<Bound<'p
     found.set_item("pairs", pairs)?;
     found.set_item("resting", &report.resting)?;
     found.set_item("dropped", &report.dropped)?;
+    found.set_item("furthest_dropped", &report.furthest_dropped)?;
     found.set_item("aligned", aligned)?;
     found.set_item("scale", report.scale)?;
     found.set_item("axes", report.axes.to_array())?;

@@ -538,10 +538,11 @@ fn excess_text(excess: &LimitExcess) -> String {
     let LimitExcess {
         joint,
         excess,
+        unit,
         sample,
     } = excess;
     format!(
-        "joint `{joint}` leaves its limits by up to {excess:.4} (first at sample {sample}); nothing was changed"
+        "joint `{joint}` leaves its limits by up to {excess:.4} {unit} (first at sample {sample}); nothing was changed"
     )
 }
 

@@ -242,6 +242,7 @@ pub(crate) fn scalars_set() -> TrackSet {
 }
 
 /// Scalars of many sizes, some of which share their key times, and some of which have tangents, one key or equal keys.
+#[cfg(feature = "prove")]
 pub(crate) fn random_scalars(random: &mut SeededRandom, scalars: usize) -> TrackSet {
     let mut set = TrackSet::new();
     let mut times: Vec<f64> = Vec::new();

@@ -370,8 +370,11 @@ impl ResultDescription<'_> {
 fn root_motion(result: &ResultDescription<'_>) -> Option<String> {
     let has_poses = result.kind.is_clip() || result.kind == ResultKind::Robot;
     (!has_poses).then(|| {
-        let name = result.format.name;
-        format!("--root-motion needs a result that is a clip, and this {name} has only numbers; write NPZ, GLB or BVH")
+        let (name, quantity) = (result.format.name, result.output.name());
+        format!(
+            "--root-motion changes translations as well as rotations, and the result ({name}, --quantity {quantity}) \
+             has only one of them; write NPZ, GLB or BVH"
+        )
     })
 }
 

@@ -303,6 +303,21 @@ fn check_single(option: &str, plan: &OutputPlan) -> Result<(), Failure> {
     }
 }
 
+/// Refuses a picture of an input that has several animations to draw.
+pub(crate) fn check_one_drawn(
+    plot: Option<&Destination>,
+    name: &str,
+    clips: usize,
+) -> Result<(), Failure> {
+    match plot {
+        Some(_) if clips != 1 => Err(Failure::usage(format!(
+            "{name}: --plot draws one animation, and there are {clips}; choose one with --animation, or leave \
+             --plot out"
+        ))),
+        _ => Ok(()),
+    }
+}
+
 /// A destination that is no result of the plan, and can be written.
 fn apart(destination: Destination, plan: &OutputPlan) -> Result<Destination, Failure> {
     for target in &plan.targets {
@@ -328,17 +343,42 @@ pub(crate) fn check_sequence(
 
 /// The document to rewrite, where the result is the input file with other keys. `otherwise` is the
 /// reason for a new file of the same format, if there is one; then a warning lists what is not copied.
+///
+/// # Errors
+/// As [`check_whole`].
 pub(crate) fn document_to_rewrite<'a>(
     work: &'a ClipWork,
     otherwise: Option<&str>,
-) -> Option<&'a dyn Document> {
+) -> Result<Option<&'a dyn Document>, Failure> {
     let (loaded, format) = (&work.input.loaded, work.target.format());
-    let document = loaded.document.as_deref()?;
+    let Some(document) = loaded.document.as_deref() else {
+        return Ok(None);
+    };
     let why = otherwise.or(loaded.adjustment.map(Adjustment::makes_new));
     if let Some(lost) = left_behind(document, &loaded.warnings, format, why) {
         work.warn(Diagnostic::new(&work.name, Code::NoRoom, lost));
     }
-    (document.writes(format) && why.is_none()).then_some(document)
+    if !document.writes(format) || why.is_some() {
+        return Ok(None);
+    }
+    check_whole(work)?;
+    Ok(Some(document))
+}
+
+/// Refuses to write a file again of which some animations were refused: they would stay in it, and programs that read
+/// it may refuse the whole file.
+pub(crate) fn check_whole(work: &ClipWork) -> Result<(), Failure> {
+    let Some(refused) = work.input.loaded.refused.first() else {
+        return Ok(());
+    };
+    Err(Failure::new(
+        ALL_INPUTS,
+        format!(
+            "{}: the result would keep the animation that cannot be read; mend or remove it, or write another format \
+             (the error: {refused})",
+            work.name
+        ),
+    ))
 }
 
 /// Why a selection of an input makes a new file, rather than the input's file with other keys.

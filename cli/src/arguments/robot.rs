@@ -1,5 +1,7 @@
 //! The options for the motion of robots: the layout of another program that results have, and its orders.
 
+use std::f64::consts::TAU;
+
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use serde::Serialize;
@@ -245,8 +247,8 @@ impl DialectArguments {
         let joint = |excess: &LimitExcess| {
             let time = times.get(excess.sample).copied().unwrap_or(0.0);
             format!(
-                "`{}` by up to {:.4} (first at {time} s)",
-                excess.joint, excess.excess
+                "`{}` by up to {:.4} {} (first at {time} s)",
+                excess.joint, excess.excess, excess.unit
             )
         };
         let joints: Vec<String> = excesses.iter().map(joint).collect();
@@ -255,7 +257,18 @@ impl DialectArguments {
             LimitRule::Report => "their values are kept (--limits clamp changes them)",
             LimitRule::Refuse => "--limits report keeps their values",
         };
-        let text = || format!("joints leave their limits: {}; {done}", joints.join(", "));
+        // In degrees, a pose that every joint can have is turns outside.
+        let is_far = |excess: &&LimitExcess| excess.unit == "rad" && excess.excess > TAU;
+        let doubt = match 2 * excesses.iter().filter(is_far).count() > excesses.len() {
+            true => "; by more than a turn: are the file's angles in degrees?",
+            false => "",
+        };
+        let text = || {
+            format!(
+                "joints leave their limits: {}; {done}{doubt}",
+                joints.join(", ")
+            )
+        };
         (!joints.is_empty()).then(text)
     }
 

@@ -110,8 +110,9 @@ fn indices(
             if names.len() > MAX_NAMED_TRACKS {
                 list += " … (`tumble info --json` names all)";
             }
+            let separator = if names.is_empty() { "" } else { ", " };
             return Err(Failure::usage(format!(
-                "{name}: {option}: there is no `{text}`{near}; it has {count}, {list}"
+                "{name}: {option}: there is no `{text}`{near}; it has {count}{separator}{list}"
             )));
         }
         found

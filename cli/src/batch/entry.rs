@@ -15,7 +15,7 @@ use crate::arguments::options::{OptionFile, with_present_names};
 use crate::batch::digest;
 use crate::batch::target::WrittenFile;
 use crate::messages::exit::{Failure, OUTPUT};
-use crate::messages::words;
+use crate::messages::{names, words};
 
 /// The name of a manifest in its directory.
 pub(crate) const NAME: &str = "manifest.jsonl";
@@ -133,7 +133,7 @@ impl InputEntry {
     pub(crate) fn pending(input: &Path, result: &str) -> Self {
         Self {
             state: InputState::Pending,
-            input: input.display().to_string(),
+            input: names::recorded(input),
             result: Some(result.to_owned()),
             code: None,
             message: None,
@@ -146,7 +146,7 @@ impl InputEntry {
     pub(crate) fn failed(input: &Path, result: Option<&str>, failure: &Failure) -> Self {
         Self {
             state: InputState::Failed,
-            input: input.display().to_string(),
+            input: names::recorded(input),
             result: result.map(str::to_owned),
             code: Some(failure.code),
             message: Some(failure.message().to_owned()),
@@ -159,7 +159,7 @@ impl InputEntry {
     pub(crate) fn skipped(path: &Path, why: String) -> Self {
         Self {
             state: InputState::Skipped,
-            input: path.display().to_string(),
+            input: names::recorded(path),
             result: None,
             code: None,
             message: Some(why),

@@ -505,7 +505,8 @@ impl ResultRecorder for Manifest {
             InputPresence::Present => true,
             InputPresence::Removed => false,
             InputPresence::Unknown => {
-                if prune {
+                // An input whose result has no name is refused again if it is there.
+                if prune && entry.result.is_some() {
                     forgotten.push(entry.input.clone());
                 }
                 !prune

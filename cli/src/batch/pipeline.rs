@@ -508,7 +508,7 @@ impl<'a> Pipeline<'a> {
         let kept = batch.previous.results_of(target.name());
         let records = kept.map(|entry| KeptResult {
             state: "kept",
-            input: names::input(path),
+            input: names::recorded(path),
             output: folder.join(&entry.output).display().to_string(),
             frames: &entry.frames,
         });
@@ -648,7 +648,7 @@ fn records_of(
 ) -> Vec<Value> {
     let base = json!({
         "state": "made",
-        "input": names::input(work.path()),
+        "input": names::recorded(work.path()),
         "animation": work.animation(),
         "output": work.target.path().display().to_string(),
         "bytes_before": bytes_before,
@@ -735,11 +735,12 @@ impl BatchRecords<'_> {
         let bytes = result.written.bytes;
         let digest = result.written.digest.take().unwrap_or_default();
         let clips = work.input.loaded.clips.len();
+        let assumed_fps = result.frames.assumed_fps.clone();
         let entry = ManifestEntry {
             output: name.to_owned(),
             output_bytes: result.written.bytes,
             output_sha256: digest.finish(),
-            input: work.path().display().to_string(),
+            input: names::recorded(work.path()),
             input_sha256: work.input.file.sha256().map(str::to_owned),
             options: self.options.text.clone(),
             option_files: self.options.files.clone(),
@@ -755,7 +756,8 @@ impl BatchRecords<'_> {
             self.made.remove(name);
         })?;
         self.progress.add_bytes(bytes);
-        if let Some(line) = self.summary.result(&result.message) {
+        let assumed = assumed_fps.as_deref();
+        if let Some(line) = self.summary.result(&result.message, assumed) {
             self.records.tell(line);
         }
         Ok(())

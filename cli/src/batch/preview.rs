@@ -2,7 +2,8 @@
 //!
 //! Inputs are read only where their clips decide the names of results.
 
-use std::collections::BTreeSet;
+use std::borrow::Cow;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use std::io;
 use std::path::Path;
@@ -55,9 +56,11 @@ pub(crate) struct PreviewedResult {
     output: String,
     /// Whether a file of that name is there.
     exists: bool,
+    /// Whether its input failed in the last run, at least in part.
+    failed_before: bool,
     /// Why it is kept or removed, or why an existing file is replaced.
     #[serde(skip_serializing_if = "Option::is_none")]
-    reason: Option<&'static str>,
+    reason: Option<Cow<'static, str>>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -83,8 +86,8 @@ impl fmt::Display for PreviewedResult {
             }
             write!(f, " → {output}")?;
         }
-        self.reason
-            .map_or(Ok(()), |reason| write!(f, " ({reason})"))
+        let reason = self.reason.iter();
+        reason.map(|reason| write!(f, " ({reason})")).collect()
     }
 }
 
@@ -97,6 +100,11 @@ impl Preview {
         };
         let planned = words::count(count(PreviewState::Planned), "result");
         let mut summary = format!("{planned} would be made");
+        let failed = self.results.iter().filter(|result| result.failed_before);
+        match failed.count() {
+            0 => {}
+            count => summary += &format!(" ({count} of inputs that failed in the last run)"),
+        }
         for (state, done) in [
             (PreviewState::Kept, "skipped (already complete)"),
             (PreviewState::Pruned, "removed"),
@@ -168,17 +176,39 @@ fn of_one_file(
     Ok(Preview {
         results: vec![PreviewedResult {
             state: PreviewState::Planned,
-            input: names::input(path),
+            input: names::recorded(path),
             animation: None,
             output: out.display().to_string(),
             exists,
-            reason: exists.then_some(REPLACED),
+            failed_before: false,
+            reason: exists.then_some(REPLACED.into()),
         }],
         refused: Vec::new(),
     })
 }
 
 const REPLACED: &str = "replaces a file";
+
+const MADE_AGAIN: &str =
+    "made again: its input, an option or the program differs, or it is damaged";
+
+/// For each result of inputs that failed in the last run, at least in part: why it is made again.
+fn failed_before(lines: &ManifestLines) -> BTreeMap<String, String> {
+    let failed = lines.unfinished_inputs().failed.into_iter();
+    let reasons = failed.filter_map(|entry| {
+        let code = entry.diagnostic.as_ref();
+        let code = code.map_or(String::new(), |code| format!(" ({code})"));
+        let failed = match entry.causes.is_empty() {
+            true => "it failed",
+            false => "some of its animations failed",
+        };
+        Some((
+            entry.result.clone()?,
+            format!("{failed} in the last run{code}"),
+        ))
+    });
+    reasons.collect()
+}
 
 impl PlannedWork<'_> {
     /// The input, where it has several clips and the format has room for one.
@@ -198,6 +228,8 @@ struct PreviewedFolder<'a> {
     work: &'a PlannedWork<'a>,
     format: &'static Format,
     previous: PreviousEntries,
+    /// Why results of the last run are missing, by name.
+    failed: BTreeMap<String, String>,
     has_shards: bool,
     planned: PlannedResults,
     /// The results that would be made.
@@ -223,8 +255,9 @@ impl<'a> PreviewedFolder<'a> {
         if shards.is_some() {
             lines.extend(record::lines(out));
         }
-        let unfinished = lines.unfinished();
+        let (unfinished, failed) = (lines.unfinished(), failed_before(&lines));
         Ok(Self {
+            failed,
             out,
             options,
             work,
@@ -243,7 +276,7 @@ impl<'a> PreviewedFolder<'a> {
         let OutputOptions {
             overwrite, resume, ..
         } = self.options;
-        let (path, input) = (&*found.path, names::input(&found.path));
+        let (path, input) = (&*found.path, names::recorded(&found.path));
         self.planned.plan(path, name);
         let owner = self.previous.results_of(name).next().map(Owner::from);
         if let Some(owner) = owner.as_ref().filter(|_| !overwrite) {
@@ -259,7 +292,8 @@ impl<'a> PreviewedFolder<'a> {
                     animation: None,
                     output: self.out.join(&entry.output).display().to_string(),
                     exists: true,
-                    reason: Some("complete, would be skipped"),
+                    failed_before: false,
+                    reason: Some("complete, would be skipped".into()),
                 }));
             self.planned.complete(name);
             return Ok(());
@@ -282,9 +316,12 @@ impl<'a> PreviewedFolder<'a> {
         for (animation, output) in results {
             let whole = self.out.join(&output);
             let exists = std::fs::symlink_metadata(&whole).is_ok();
-            let reason = match resume && self.previous.entries().contains_key(&output) {
-                true => "made again: its input, an option or the program differs, or it is damaged",
-                false => REPLACED,
+            let is_known = resume && self.previous.entries().contains_key(&output);
+            let reason: Option<Cow<'static, str>> = match self.failed.get(name) {
+                Some(reason) if resume => Some(reason.clone().into()),
+                _ if !exists => None,
+                _ if is_known => Some(MADE_AGAIN.into()),
+                _ => Some(REPLACED.into()),
             };
             self.preview.results.push(PreviewedResult {
                 state: PreviewState::Planned,
@@ -292,7 +329,8 @@ impl<'a> PreviewedFolder<'a> {
                 animation,
                 output: whole.display().to_string(),
                 exists,
-                reason: exists.then_some(reason),
+                failed_before: resume && self.failed.contains_key(name),
+                reason,
             });
             self.made.insert(output);
         }
@@ -335,7 +373,8 @@ impl<'a> PreviewedFolder<'a> {
                 animation: None,
                 output,
                 exists: true,
-                reason: Some(self.planned.why_orphan(entry)),
+                failed_before: false,
+                reason: Some(self.planned.why_orphan(entry).into()),
             });
         }
     }

@@ -56,10 +56,10 @@ impl ResultNaming {
     /// The path of an input's result below the directory of results.
     fn name(self, format: &Format, found: &FoundInput) -> PathBuf {
         match self {
-            Self::Stem => below(found).with_extension(format.name),
+            Self::Stem => below(found).with_extension(format.ending()),
             Self::Full => {
                 let mut name = below(found).as_os_str().to_owned();
-                name.push(format!(".{}", format.name));
+                name.push(format!(".{}", format.ending()));
                 name.into()
             }
         }

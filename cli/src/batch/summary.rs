@@ -32,6 +32,8 @@ pub(crate) struct BatchSummary {
     printed: BTreeSet<Option<Code>>,
     /// How many lines were left out.
     left_out: usize,
+    /// The results whose lines were left out, and which have a rate that was assumed: how many, and the first rate.
+    assumed: Option<(usize, String)>,
 }
 
 /// The inputs with warnings of one code.
@@ -59,11 +61,16 @@ impl BatchSummary {
             failures: BTreeMap::new(),
             printed: BTreeSet::new(),
             left_out: 0,
+            assumed: None,
         }
     }
 
-    /// The line about a result, if it is to be printed.
-    pub(crate) fn result<'a>(&mut self, line: &'a str) -> Option<&'a str> {
+    /// The line about a result, if it is to be printed. `assumed_fps` is the rate of a result whose input has none.
+    pub(crate) fn result<'a>(
+        &mut self,
+        line: &'a str,
+        assumed_fps: Option<&str>,
+    ) -> Option<&'a str> {
         match self.results_left.checked_sub(1) {
             Some(left) => {
                 self.results_left = left;
@@ -71,6 +78,10 @@ impl BatchSummary {
             }
             None => {
                 self.left_out += 1;
+                if let Some(rate) = assumed_fps {
+                    let assumed = self.assumed.get_or_insert_with(|| (0, rate.to_owned()));
+                    assumed.0 += 1;
+                }
                 None
             }
         }
@@ -126,9 +137,10 @@ impl BatchSummary {
                 warnings,
                 first,
             } => format!("{first} (and {} more: --verbose lists them)", warnings - 1),
-            WarnedInputs { inputs, .. } => {
-                format!("{code} {inputs} files: {} {MORE}", code.title())
-            }
+            WarnedInputs { inputs, first, .. } => format!(
+                "{code} {inputs} files: {}; the first: {first} {MORE}",
+                code.title()
+            ),
         });
         let failed = self.failures.iter().map(|(code, of_code)| {
             let FailedInputs { count, first } = of_code;
@@ -148,7 +160,14 @@ impl BatchSummary {
                 None => format!("{files} failed, the first: {first} {MORE}"),
             }
         });
-        warned.chain(failed).collect()
+        let assumed = self.assumed.iter().map(|(count, rate)| {
+            let results = words::count(*count, "result");
+            let have = if *count == 1 { "has" } else { "have" };
+            format!(
+                "{results} {have} {rate} fps, because the keys have no rate (--fps chooses one)"
+            )
+        });
+        assumed.chain(warned).chain(failed).collect()
     }
 
     /// Whether lines about results were left out.

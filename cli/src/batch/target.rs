@@ -93,7 +93,7 @@ pub(crate) fn refuse_both_on_standard(prints_json: bool, out: &Path) -> Result<(
 }
 
 fn path_of_clip(path: &Path, clip: &str, format: &Format) -> PathBuf {
-    path.with_extension(format!("{clip}.{}", format.name))
+    path.with_extension(format!("{clip}.{}", format.ending()))
 }
 
 /// The name of the result of one of several clips, from that of all: `fox.npy` becomes `fox.Run.npy`.

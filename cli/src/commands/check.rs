@@ -173,8 +173,15 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
     let total = words::count(entries.len(), "result");
     let mut missing: Vec<String> = Vec::new();
-    if !faults.is_empty() {
-        missing.push(format!("{} of {total} differ", faults.len()));
+    let unreadable = |(_, fault): &&(_, Fault)| matches!(fault, Fault::Unreadable(_));
+    let unreadable = faults.iter().filter(unreadable).count();
+    for (count, verb) in [
+        (faults.len() - unreadable, "changed"),
+        (unreadable, "missing or unreadable"),
+    ] {
+        if count > 0 {
+            missing.push(format!("{count} of {total} {verb}"));
+        }
     }
     if lines.damaged > 0 {
         let damaged = words::count(lines.damaged, "line");
@@ -182,6 +189,11 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
     let is_made_again = !faults.is_empty() || !lines.unfinished_inputs().pending.is_empty();
     missing.extend(unfinished(&lines));
+    if !missing.is_empty()
+        && let Some(progress) = &progress
+    {
+        missing.push(unmerged(folder, progress));
+    }
     if !missing.is_empty() {
         let missing = missing.join(", ");
         // A manifest is recognised by its first line.

@@ -142,7 +142,7 @@ impl Arguments {
             return self.convert_robot(dialect, work);
         }
         let loaded = &work.input.loaded;
-        let document = document_to_rewrite(work, self.makes_new(target));
+        let document = document_to_rewrite(work, self.makes_new(target))?;
         let parts = clips.iter().map(|&clip| self.part(name, clip));
         let parts: Vec<Cow<'_, Motion>> = parts.collect::<Result<_, Failure>>()?;
         let is_whole = (self.start, self.end) == (None, None);

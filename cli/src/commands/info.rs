@@ -155,11 +155,15 @@ impl ScalarSummary {
     }
 
     fn text(&self) -> String {
-        let [least, largest] = self.range;
-        let name = printable(&self.name);
-        let mut text = format!("{name}  {}  {least:.4} to {largest:.4}", self.kind);
-        if let Some([least, largest]) = self.limits {
-            let _ = write!(text, ", limits {least:.4} to {largest:.4}");
+        let range = |ends: [f64; 2]| ends.map(words::decimals).join(" to ");
+        let (name, kind) = (printable(&self.name), self.kind);
+        let mut text = format!(
+            "{name}  {kind}  {}  {}",
+            words::count(self.keys, "key"),
+            range(self.range)
+        );
+        if let Some(limits) = self.limits {
+            let _ = write!(text, ", limits {}", range(limits));
         }
         text
     }
@@ -239,9 +243,11 @@ pub(crate) struct Steps {
 }
 
 impl Steps {
-    /// The steps of all tracks; `None` if no track has two keys.
+    /// The steps of all rotations and scalars; `None` if none has two keys.
     pub(crate) fn of(set: &TrackSet) -> Option<Self> {
-        let steps = set.tracks().flat_map(|track| track.times.windows(2));
+        let scalars = (0..set.scalar_count()).filter_map(|index| set.scalar(index));
+        let times = (set.tracks().map(|track| track.times)).chain(scalars.map(|keys| keys.times));
+        let steps = times.flat_map(|times| times.windows(2));
         let each = steps.map(|times| Self {
             shortest: times[1] - times[0],
             longest: times[1] - times[0],
@@ -416,7 +422,7 @@ impl Summary {
             let count = self.scalars.len();
             line(
                 "scalars",
-                format!("{count}: name, kind, smallest and largest key"),
+                format!("{count}: name, kind, number of keys, smallest and largest key"),
             );
         }
         for scalar in &self.scalars {

@@ -10,6 +10,7 @@ use serde::Serialize;
 use tumble::EulerSequence;
 use tumble_formats::format::{Document, MotionOptions};
 use tumble_formats::motion::Motion;
+use tumble_formats::printable::printable;
 use tumble_formats::retarget::{
     HipsScale, RestAlignment, RetargetError, RetargetOptions, RetargetReport, open_target, retarget,
 };
@@ -187,6 +188,8 @@ struct ClipReport {
     resting: Vec<String>,
     /// Joints of the input that nothing follows.
     dropped: Vec<String>,
+    /// Of these, the joint that rotates furthest from where it rests, and how far, in degrees.
+    furthest_dropped: Option<(String, f64)>,
     /// By how many degrees the rest pose of each joint was aligned.
     aligned: serde_json::Map<String, serde_json::Value>,
     scale: f64,
@@ -215,6 +218,7 @@ impl ClipReport {
             pairs: object(report.pairs),
             resting: report.resting,
             dropped: report.dropped,
+            furthest_dropped: report.furthest_dropped,
             aligned: object(report.aligned),
             scale: report.scale,
             axes: report.axes.to_array(),
@@ -269,9 +273,18 @@ impl Arguments {
                 );
                 work.warn(Diagnostic::new(name, Code::TranslationsDropped, message));
             }
+            if let Some((joint, angle)) = &report.furthest_dropped {
+                let message = format!(
+                    "nothing follows {} of the input; of these, `{}` rotates by up to {angle:.1}°, which is lost (--report \
+                     lists them, --bones pairs joints)",
+                    words::count(report.dropped.len(), "joint"),
+                    printable(joint)
+                );
+                work.warn(Diagnostic::new(name, Code::RotationsDropped, message));
+            }
             if report.are_axes_assumed {
-                let message = "the axes of both skeletons are taken to be the same, because the parts of the body are not \
-                               known by their names; --up-axis rotates the input";
+                let message = "the axes of both skeletons are taken to be the same, because it is not known which joints \
+                               are the parts of the body, or where these are at rest; --up-axis rotates the input";
                 words::note(&format!("{name}: {message}"));
             }
             reports.push(ClipReport::new(&motion, report));

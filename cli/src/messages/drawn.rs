@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 use tumble_formats::motion::Motion;
 
+use crate::messages::exit::Failure;
 use crate::messages::{names, words};
 
 /// A picture, a film or a page, as `--json` prints it.
@@ -27,7 +28,7 @@ impl DrawnFile {
     /// A file that has been written.
     pub(crate) fn new(inputs: &[PathBuf], output: &Path, device: &str) -> Self {
         Self {
-            inputs: inputs.iter().map(|path| names::input(path)).collect(),
+            inputs: inputs.iter().map(|path| names::recorded(path)).collect(),
             output: output.display().to_string(),
             output_bytes: bytes(output),
             frames: None,
@@ -54,6 +55,17 @@ pub(crate) fn note_scalars(name: &str, clip: &Motion) {
             words::count(count, "scalar")
         ));
     }
+}
+
+/// Refuses a clip without tracks. `remedy` is the command that its scalars need.
+pub(crate) fn check_has_tracks(name: &str, clip: &Motion, remedy: &str) -> Result<(), Failure> {
+    if clip.set.track_count() > 0 {
+        return Ok(());
+    }
+    let scalars = words::count(clip.set.scalar_count(), "scalar");
+    Err(Failure::usage(format!(
+        "{name}: has no tracks of rotations, only {scalars}; {remedy}"
+    )))
 }
 
 /// The bytes of a file, or of the files in a directory.

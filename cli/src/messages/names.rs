@@ -21,6 +21,15 @@ pub(crate) fn input(path: &Path) -> String {
     }
 }
 
+/// The name of an input in JSON and in manifests: as it is, so that a program can open it. Bytes that are not UTF-8,
+/// for which JSON has no room, are escaped as in messages.
+pub(crate) fn recorded(path: &Path) -> String {
+    match path.to_str() {
+        Some(name) if !is_standard(path) => name.to_owned(),
+        _ => input(path),
+    }
+}
+
 /// `folder/walk.dat` is `walk.dat` in titles.
 pub(crate) fn file(path: &Path) -> String {
     match path.file_name() {

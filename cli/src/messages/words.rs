@@ -170,6 +170,7 @@ pub(crate) fn bytes(bytes: f64) -> String {
 
 /// A number of four significant digits in plain decimals: `17.04`, `0.0001661`, `0`. Below 1e-9 it has an exponent.
 pub(crate) fn decimals(number: f64) -> String {
+    let number = number + 0.0; // -0 is 0
     let size = number.abs();
     if size > 0.0 && size < 1e-9 {
         return format!("{number:.3e}");

@@ -8,11 +8,10 @@ use ::csv::{ByteRecord, Reader, ReaderBuilder};
 
 use crate::budget::Budget;
 use crate::csv::capture::{CaptureHeading, has_no_number};
-use crate::decimal::Decimal;
+use crate::decimal::{Decimal, decimal_count};
 use crate::diagnostic::{Code, Diagnostic, Location};
 use crate::dialect;
 use crate::format::{Loaded, ReadOptions, TimeUnit};
-use crate::rate::last_digit_power;
 use crate::source::Source;
 use crate::table::clips::clips;
 use crate::table::columns::{Column, ColumnNeed, ColumnNumbers, ColumnValues, Table};
@@ -456,8 +455,7 @@ impl TextCell<'_> {
         let (token, power) = (as_text(text), self.sheet.time_power);
         let time = Decimal::parse_in(&token, power).ok_or_else(|| self.out_of_range(text))?;
         times.push(time);
-        let last = last_digit_power(&token).saturating_add(power);
-        *decimals = (*decimals).max(last.min(0).unsigned_abs());
+        *decimals = (*decimals).max(decimal_count(&token, power));
         Ok(())
     }
 

@@ -14,7 +14,7 @@ use tumble::FrameRate;
 use tumble::trees::{BodyOrder, JointKind, Tree, TreeJoint};
 
 use crate::diagnostic::{Code, Diagnostic};
-use crate::format::WriteError;
+use crate::format::{Format, WriteError};
 use crate::quaternion::ComponentOrder;
 use crate::robot::{Bodies, VelocityPoint, joints_of};
 
@@ -33,6 +33,8 @@ pub struct WrittenDialect {
     pub has_bodies: bool,
     /// Whether it names joints, so that they may be in any order.
     pub names_joints: bool,
+    /// Whether its numbers for joints are degrees. Slides have none.
+    pub has_degrees: bool,
     /// The point of a body whose velocity it has.
     pub velocity_at: VelocityPoint,
     /// The order of a quaternion's components; `None` if it has none.
@@ -101,10 +103,7 @@ impl WrittenDialect {
     /// How files in it end.
     #[must_use]
     pub fn extension(&self) -> &'static str {
-        match self.format {
-            "pickle" => "pkl",
-            format => format,
-        }
+        Format::named(self.format).map_or(self.format, Format::ending)
     }
 
     /// Writes a motion; returns warnings about data that is not stored.
@@ -135,6 +134,15 @@ impl WrittenDialect {
             );
             return Err(refuse(message).into());
         }
+        let slides = motion.tree_joints().into_iter();
+        let slide = slides.filter(|joint| joint.kind == JointKind::Slide).next();
+        if let Some(slide) = slide.filter(|_| self.has_degrees) {
+            let message = format!(
+                "`{}` slides, and {} has an angle in degrees for each joint; {OTHER_FILES}",
+                slide.name, self.name
+            );
+            return Err(refuse(message).into());
+        }
         if counts.free > 1 {
             let message = format!(
                 "the robot has {} free joints, and {} has one root; {OTHER_FILES}",
@@ -148,8 +156,8 @@ impl WrittenDialect {
             .filter(|&assumed| rate.per_second() != assumed as f64);
         let warning = assumed.map(|assumed| {
             let message = format!(
-                "{} has no rate, and its readers take {assumed} frames a second; these are {rate}: tell them, or \
-                 give --fps {assumed}",
+                "{} has no rate, and its readers take {assumed} frames a second; these are {rate}: tell its readers, or \
+                 use `tumble eval --fps {assumed}`",
                 self.name
             );
             Diagnostic::new(motion.output, Code::AssumedRate, message)

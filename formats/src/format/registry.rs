@@ -8,6 +8,16 @@ use crate::format::{Format, FormatOption, Loaded, ReadOptions};
 use crate::source::{START, Source};
 
 impl Format {
+    /// How the names of its files end by default: the first of its extensions that readers look for, or its name.
+    #[must_use]
+    pub fn ending(&self) -> &'static str {
+        match self.name {
+            // Loaders of robots' motions look for `*.pkl`.
+            "pickle" => "pkl",
+            name => name,
+        }
+    }
+
     /// The format with this name or extension; case is ignored.
     #[must_use]
     pub fn named(name: &str) -> Option<&'static Self> {

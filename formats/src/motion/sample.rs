@@ -134,6 +134,19 @@ impl ChannelMethods {
             .then_some(first)
     }
 
+    /// The name of the one method for the rotations of all tracks, or for the scalars of a clip without tracks; `None`
+    /// where their samplers differ.
+    #[must_use]
+    pub fn name_of(&self, clip: &Motion) -> Option<&'static str> {
+        if clip.set.track_count() > 0 {
+            return self.method_of(clip).map(|method| method.name);
+        }
+        let scalars = 0..clip.set.scalar_count();
+        let mut methods = scalars.map(|index| self.scalar_method(clip.scalar(index).interpolation));
+        let first = methods.next()?;
+        methods.all(|method| method == first).then(|| first.name())
+    }
+
     /// The one method for all rotations that change; [`method::SLERP`] if none does.
     ///
     /// # Errors

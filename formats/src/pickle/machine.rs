@@ -793,6 +793,12 @@ impl<'a> Machine<'a> {
 
     /// Adds a node, and pushes it.
     pub(super) fn add(&mut self, node: Node) -> Result<(), Diagnostic> {
+        let id = self.new_node(node)?;
+        self.push(id)
+    }
+
+    /// A node that is not on the stack.
+    pub(super) fn new_node(&mut self, node: Node) -> Result<NodeId, Diagnostic> {
         if self.nodes.len() >= MAX_NODES {
             let message = format!("it has more than {MAX_NODES} values");
             return Err(self.refuse(Code::PickleLimits, message));
@@ -800,7 +806,7 @@ impl<'a> Machine<'a> {
         self.charge(1, NODE)?;
         let id = NodeId(self.nodes.len() as u32);
         self.nodes.push(node);
-        self.push(id)
+        Ok(id)
     }
 
     fn push(&mut self, node: NodeId) -> Result<(), Diagnostic> {

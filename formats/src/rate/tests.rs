@@ -49,6 +49,10 @@ fn keys(formula: &str, rate: FrameRate, kept_as: &str) -> (Vec<f64>, Precision) 
     if formula.starts_with("k * f32(") {
         let times = frames.map(|k| f64::from(k as f32 * period as f32));
         return kept(times, kept_as);
+    } else if formula.starts_with("k sums of f32(") {
+        let period = period as f32;
+        let sums = std::iter::successors(Some(0.0f32), |sum| Some(sum + period));
+        return kept(sums.take(1000).map(f64::from), kept_as);
     } else if formula.starts_with("k * f64(") {
         return kept(frames.map(|k| f64::from(k) * period), kept_as);
     }

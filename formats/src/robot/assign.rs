@@ -1,15 +1,18 @@
 //! The joints of a robot in the clips of a file: the root and the scalars get the names of the robot's joints. Files that
 //! name no joints have them in an order, which follows from the poses of bodies that the file has beside them.
 
+use std::collections::HashMap;
 use std::f64::consts::TAU;
 
 use glam::{DQuat, DVec3};
-use tumble::trees::{BodyOrder, BodyPose, JointKind, Siblings, Tree, TreeJoint};
-use tumble::{Channel, TrackError, TrackSet};
+use tumble::trees::{BodyOrder, BodyPose, JointKind, Mimic, Siblings, Tree, TreeJoint};
+use tumble::{Channel, ScalarKeys, TrackError, TrackSet};
 
 use crate::diagnostic::{Code, Diagnostic};
+use crate::dialect::write::WrittenDialect;
 use crate::format::{Adjustment, Loaded};
 use crate::motion::{Motion, RecordedBodies, Scalar, ScalarKind, carry_key_data};
+use crate::printable::printable;
 use crate::quaternion::ComponentOrder;
 use crate::robot::Robot;
 use crate::robot::bodies::unwrap_joint;
@@ -83,8 +86,8 @@ impl Robot {
     ) -> Result<Motion, Diagnostic> {
         let refuse = |message: String| Diagnostic::new(file, Code::JointsDoNotFit, message);
         let tree = &self.tree;
-        let names: Vec<&str> = clip.scalar_keys().map(|keys| keys.name).collect();
-        let candidate = choose(tree, clip, &names, order, warnings, &refuse)?;
+        let scalars = valued_scalars(tree, clip, warnings);
+        let candidate = choose(tree, clip, &scalars, order, warnings, &refuse)?;
         let mut motion = Motion {
             set: TrackSet::new(),
             ..clip.without_tracks()
@@ -108,8 +111,17 @@ impl Robot {
             motion.set_origin(index, clip.origin(track));
         }
         let joints: Vec<&TreeJoint> = tree.scalar_joints().collect();
-        for (index, (&joint, keys)) in candidate.joints.iter().zip(clip.scalar_keys()).enumerate() {
+        for (&joint, &(index, keys)) in candidate.joints.iter().zip(&scalars) {
             let (joint, scalar) = (joints[joint], clip.scalar(index));
+            let is_in_degrees = (clip.robot.as_ref())
+                .and_then(|robot| WrittenDialect::named(robot.dialect))
+                .is_some_and(|dialect| dialect.has_degrees);
+            if joint.kind == JointKind::Slide && is_in_degrees {
+                return Err(refuse(format!(
+                    "`{}` slides, and the file has angles in degrees for all joints",
+                    joint.name
+                )));
+            }
             let mut values: Vec<f64> = keys
                 .keys
                 .iter()
@@ -150,11 +162,65 @@ impl Robot {
     }
 }
 
-/// The whole turns nearest to the middle of some angles; `None` if there are none.
+/// The scalars of joints with values of their own, and their names. Joints that follow others (`mimic`) are computed; a
+/// warning says how far the file's values are from the computed ones.
+fn valued_scalars<'a>(
+    tree: &Tree,
+    clip: &'a Motion,
+    warnings: &mut Warnings,
+) -> Vec<(usize, ScalarKeys<'a>)> {
+    let joints = tree.bodies().iter().flat_map(|body| &body.joints);
+    let mimics: HashMap<&str, &Mimic> = joints
+        .filter_map(|joint| Some((&*joint.name, joint.mimic.as_ref()?)))
+        .collect();
+    let values = |index: usize, keys: &ScalarKeys<'a>| {
+        let origin = clip.scalar(index).origin;
+        let values = keys.keys.iter();
+        values
+            .map(move |&key| f64::from(key) + origin)
+            .collect::<Vec<f64>>()
+    };
+    let mut valued = Vec::new();
+    for (index, keys) in clip.scalar_keys().enumerate() {
+        let Some(mimic) = mimics.get(keys.name) else {
+            valued.push((index, keys));
+            continue;
+        };
+        let source = clip.set.scalar_named(&mimic.joint);
+        let source = source.and_then(|source| Some((source, clip.set.scalar(source)?)));
+        let source = source.filter(|(_, source)| source.times == keys.times);
+        let largest = source.map(|(source, source_keys)| {
+            let computed = values(source, &source_keys).into_iter();
+            let computed = computed.map(|value| mimic.multiplier * value + mimic.offset);
+            let apart = computed
+                .zip(values(index, &keys))
+                .map(|(a, b)| (a - b).abs());
+            apart.fold(0.0, f64::max)
+        });
+        warnings.warn(Code::FollowingJoints, || {
+            let apart = match largest {
+                Some(largest) => format!("the file's values are up to {largest:.2e} from these"),
+                None => "the file's values were not compared with these".to_owned(),
+            };
+            let message = format!(
+                "joint `{}` follows `{}` (mimic), and is computed from it; {apart}",
+                printable(keys.name),
+                mimic.joint
+            );
+            (None, message)
+        });
+    }
+    valued
+}
+
+/// The whole turns nearest to the middle of some angles, if without them the largest angle is less than half as large:
+/// angles near 0 keep the digits of the file.
 fn whole_circles(angles: &[f64]) -> Option<f64> {
     let [low, high] = [f64::min, f64::max].map(|pick| angles.iter().copied().reduce(pick));
-    let circles = (f64::midpoint(low?, high?) / TAU).round();
-    (circles != 0.0).then_some(circles * TAU)
+    let (low, high) = (low?, high?);
+    let turns = (f64::midpoint(low, high) / TAU).round() * TAU;
+    let [before, after] = [0.0, turns].map(|turns| (low - turns).abs().max((high - turns).abs()));
+    (2.0 * after < before).then_some(turns)
 }
 
 /// The tracks that move joints, with the names of these.
@@ -235,11 +301,12 @@ pub(crate) fn joints_of(tree: &Tree, bodies: &[usize]) -> Vec<usize> {
 fn choose(
     tree: &Tree,
     clip: &Motion,
-    names: &[&str],
+    scalars: &[(usize, ScalarKeys<'_>)],
     stated: Option<BodyOrder>,
     warnings: &mut Warnings,
     refuse: &impl Fn(String) -> Diagnostic,
 ) -> Result<Candidate, Diagnostic> {
+    let names: Vec<&str> = scalars.iter().map(|(_, keys)| keys.name).collect();
     let recorded = clip.robot.as_ref().and_then(|robot| robot.bodies.as_ref());
     let is_numbered = names
         .iter()
@@ -254,12 +321,18 @@ fn choose(
         .flat_map(|order| Siblings::ALL.map(|siblings| ListedOrder(order, siblings)))
         .collect();
     let by_name = names_joints
-        .then(|| joints_by_name(tree, names, refuse))
+        .then(|| joints_by_name(tree, &names, refuse))
         .transpose()?;
     if by_name.is_none() && names.len() != tree.counts().scalars {
         let joints: Vec<&str> = tree.scalar_joints().map(|joint| &*joint.name).collect();
+        let all = tree.bodies().iter().flat_map(|body| &body.joints);
+        let mimics = all.filter(|joint| joint.mimic.is_some());
+        let mimics = listed(mimics.map(|joint| joint.name.clone()).collect());
+        let mimics = mimics.map_or(String::new(), |mimics| {
+            format!(" (and these, which follow them: {mimics})")
+        });
         return Err(refuse(format!(
-            "the file has {} joints, and the robot {}: {}",
+            "the file has {} joints without names, and the robot {}: {}{mimics}",
             names.len(),
             joints.len(),
             joints.join(", ")
@@ -298,20 +371,25 @@ fn choose(
         .and_then(|recorded| {
             let errors = candidates
                 .iter()
-                .map(|candidate| error(tree, clip, recorded, candidate));
+                .map(|candidate| error(tree, (clip, scalars), recorded, candidate));
             errors.collect::<Option<Vec<f64>>>()
         });
     let (Some(errors), Some(recorded)) = (errors, recorded) else {
-        // The file is known to belong to one of two programs, whose orders differ.
-        let is_doubtful = recorded.is_some() && by_name.is_none() && stated.is_none();
+        let is_doubtful = by_name.is_none() && stated.is_none();
         if is_doubtful
             && candidates
                 .iter()
                 .any(|other| other.joints != candidates[0].joints)
         {
             warnings.warn(Code::UnnamedJoints, || {
-                let message = "the file does not name its joints, and its bodies are not those of the robot; they are \
-                               taken depth first; --source-body-order gives another order";
+                let unchecked = match recorded {
+                    Some(_) => "its bodies are not those of the robot",
+                    None => "has no bodies that would show their order",
+                };
+                let message = format!(
+                    "the file does not name its joints, and {unchecked}; they are taken depth first, as in the \
+                     robot's file; --source-body-order gives another order"
+                );
                 (None, message)
             });
         }
@@ -412,6 +490,13 @@ fn joints_by_name(
     let position = |name: &&str| joints.iter().position(|joint| joint == name);
     let found: Option<Vec<usize>> = names.iter().map(position).collect();
     found.ok_or_else(|| {
+        let repeated = names.iter().find_map(|name| {
+            let (first, number) = name.rsplit_once('#')?;
+            (number.parse::<u32>().is_ok() && names.contains(&first)).then_some(first)
+        });
+        if let Some(repeated) = repeated {
+            return refuse(format!("the file names the joint `{repeated}` twice"));
+        }
         let unknown: Vec<&str> = names
             .iter()
             .copied()
@@ -452,7 +537,7 @@ fn bodies_of(
 /// The largest distance of a recorded body from where its joints put it; `None` if it cannot be compared.
 fn error(
     tree: &Tree,
-    clip: &Motion,
+    (clip, scalars): (&Motion, &[(usize, ScalarKeys<'_>)]),
     recorded: &RecordedBodies,
     candidate: &Candidate,
 ) -> Option<f64> {
@@ -461,9 +546,9 @@ fn error(
     let mut largest: f64 = 0.0;
     for sample in &recorded.samples {
         let mut at = tree.rest();
-        for (index, &joint) in candidate.joints.iter().enumerate() {
-            let key = clip.set.scalar(index)?.keys.get(sample.key)?;
-            at.scalars[joint] = f64::from(*key) + clip.scalar(index).origin;
+        for (&joint, (index, keys)) in candidate.joints.iter().zip(scalars) {
+            let key = keys.keys.get(sample.key)?;
+            at.scalars[joint] = f64::from(*key) + clip.scalar(*index).origin;
         }
         let [a, b, c, d] = sample.root;
         let rotation = match candidate.quaternions {

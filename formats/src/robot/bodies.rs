@@ -13,8 +13,8 @@ use tumble::{
     TrackSet, VectorMethod, names,
 };
 
-use crate::motion::Motion;
 use crate::motion::signs::continue_signs;
+use crate::motion::{Motion, ScalarKind};
 use crate::npz::rotation_vector;
 
 /// The options of computing a robot's bodies from its motion.
@@ -118,8 +118,10 @@ pub struct Bodies {
 pub struct LimitExcess {
     /// The joint.
     pub joint: String,
-    /// The largest distance from the limits, rad or metres.
+    /// The largest distance from the limits.
     pub excess: f64,
+    /// The unit of this distance: `rad` or `m`; empty if the file does not tell angles from lengths.
+    pub unit: &'static str,
     /// The first sample outside the limits.
     pub sample: usize,
 }
@@ -158,9 +160,9 @@ pub enum BodiesError {
     },
     /// A joint leaves its limits, and this is refused.
     #[error(
-        "joint `{}` leaves its limits by {:.3}, first at sample {}; --limits clamp keeps it inside, --limits report \
-         keeps its values",
-        excess.joint, excess.excess, excess.sample
+        "joint `{}` leaves its limits by {:.3} {}, first at sample {}; --limits clamp keeps it \
+         inside, --limits report keeps its values",
+        excess.joint, excess.excess, excess.unit, excess.sample
     )]
     OutsideLimits {
         /// The joint and by how much.
@@ -366,12 +368,17 @@ pub fn mass_centres(tree: &Tree, point: VelocityPoint) -> Result<Vec<DVec3>, Bod
 
 fn note_excesses(tree: &Tree, values: &[f64], sample: usize, excesses: &mut Vec<LimitExcess>) {
     for (joint, &value) in tree.scalar_joints().zip(values) {
-        note_excess((&joint.name, joint.limits), value, sample, excesses);
+        let unit = if joint.kind == JointKind::Slide {
+            "m"
+        } else {
+            "rad"
+        };
+        note_excess((&joint.name, joint.limits, unit), value, sample, excesses);
     }
 }
 
 fn note_excess(
-    (name, limits): (&str, Option<[f64; 2]>),
+    (name, limits, unit): (&str, Option<[f64; 2]>, &'static str),
     value: f64,
     sample: usize,
     excesses: &mut Vec<LimitExcess>,
@@ -389,6 +396,7 @@ fn note_excess(
         None => excesses.push(LimitExcess {
             joint: name.to_owned(),
             excess,
+            unit,
             sample,
         }),
     }
@@ -403,7 +411,17 @@ pub fn scalar_excesses(clip: &Motion, values: &[f32]) -> Vec<LimitExcess> {
         for ((index, keys), &value) in clip.scalar_keys().enumerate().zip(row) {
             let scalar = clip.scalar(index);
             let value = f64::from(value) + scalar.origin;
-            note_excess((keys.name, scalar.limits), value, sample, &mut excesses);
+            let unit = match scalar.kind {
+                ScalarKind::Angle => "rad",
+                ScalarKind::Length => "m",
+                _ => "",
+            };
+            note_excess(
+                (keys.name, scalar.limits, unit),
+                value,
+                sample,
+                &mut excesses,
+            );
         }
     }
     excesses

@@ -326,6 +326,11 @@ impl ColumnNames<'_> {
         if is_pose && vectors.translation.is_none() && self.find(&format!("{prefix}x"))?.is_some() {
             vectors.translation = self.group(prefix, ["x", "y", "z"])?;
         }
+        if vectors.translation.is_none()
+            && let Some(beside) = prefix_of_position(prefix)
+        {
+            vectors.translation = self.group(&beside, ["x", "y", "z"])?;
+        }
         let parts = Parts {
             rotation: RotationCells::Quaternion(rotation),
             translation: vectors.translation,
@@ -373,6 +378,19 @@ impl ColumnNames<'_> {
         }
         Ok(())
     }
+}
+
+/// The prefix of the columns of a position, from that of an orientation, as the fields of ROS' poses and transforms are
+/// called: `pose.orientation.x` beside `pose.position.x`.
+fn prefix_of_position(of_rotation: &str) -> Option<String> {
+    let separator = of_rotation.chars().next_back()?;
+    let names = [("orientation", "position"), ("rotation", "translation")];
+    names.into_iter().find_map(|(rotation, position)| {
+        let before = of_rotation
+            .strip_suffix(separator)?
+            .strip_suffix(rotation)?;
+        Some(format!("{before}{position}{separator}"))
+    })
 }
 
 /// The columns of the translations and scales of one track.

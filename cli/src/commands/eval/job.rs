@@ -14,6 +14,7 @@ use tumble_formats::format::{Document, FormatOption, MotionOptions, ResultShape}
 use tumble_formats::motion::{Joint, Motion, SampledClip, Transform};
 use tumble_formats::origin::origin_of;
 use tumble_formats::poses::{Poses, SCALAR, TRANSFORM, WORLD};
+use tumble_formats::printable::printable;
 use tumble_formats::quaternion::ComponentOrder;
 use tumble_formats::root_motion::{
     RootMotionRule, keys_with_root_motion, track_samples, with_root_motion,
@@ -26,7 +27,7 @@ use crate::arguments::device::{OpenedDevice, stream_chunk};
 use crate::arguments::interpolation::{CurveChoice, curve_warning};
 use crate::arguments::options::ResultKind;
 use crate::arguments::output::PoseKind;
-use crate::arguments::results::document_to_rewrite;
+use crate::arguments::results::{check_whole, document_to_rewrite};
 use crate::arguments::robot::{RobotFrames, RobotReport, or_engine_error};
 use crate::arguments::time::{ClipFrames, SampleChoice};
 use crate::batch::entry::FrameNotes;
@@ -34,6 +35,7 @@ use crate::batch::pipeline::{ClipWork, EvaluatedResult, Pipeline};
 use crate::batch::room;
 use crate::batch::target::{ResultTarget, WrittenFile};
 use crate::commands::eval::arguments::Arguments;
+use crate::messages::drawn::check_has_tracks;
 use crate::messages::exit::{ALL_INPUTS, Failure};
 use crate::messages::words;
 
@@ -143,6 +145,11 @@ impl EvaluationJob<'_> {
         if kind == ResultKind::Baked {
             return self.bake(name, clips, target);
         }
+        if matches!(kind, ResultKind::Rotations | ResultKind::Poses) && output.scalars().is_none() {
+            let remedy = "write NPZ, CSV or Parquet, or add --quantity scalars";
+            let mut each = clips.iter();
+            each.try_for_each(|clip| check_has_tracks(name, clip, remedy))?;
+        }
         // Writers of clips themselves report the data that they cannot store.
         if kind != ResultKind::Motion {
             self.warn_of_lost_channels(clips);
@@ -158,7 +165,7 @@ impl EvaluationJob<'_> {
             document_to_rewrite(
                 work,
                 some.or(more.then_some("a joint with root motion makes")),
-            );
+            )?;
             let selected = clips
                 .iter()
                 .map(|&clip| tracks.select_with_ancestors(clip, name));
@@ -205,9 +212,12 @@ impl EvaluationJob<'_> {
         if output.poses().is_none() && has(Motion::has_vectors) {
             lost.push("the translations and scales");
         }
-        if !is_of_scalars && has(|clip| clip.set.scalar_count() > 0) {
-            lost.push("the scalars");
-        }
+        let first = clips
+            .iter()
+            .find_map(|clip| clip.set.scalar(0))
+            .filter(|_| !is_of_scalars);
+        let scalars = first.map(|first| format!("the scalars (`{}` …)", printable(first.name)));
+        lost.extend(scalars.as_deref());
         if !lost.is_empty() {
             let message = format!(
                 "--quantity {} writes no other numbers of the clip; left out: {}; -o FILE.npz has all of them",
@@ -332,13 +342,19 @@ impl EvaluationJob<'_> {
             .work
             .clips()
             .into_iter()
-            .map(|clip| methods.method_of(clip));
+            .map(|clip| methods.name_of(clip));
         let first = of_clips.next().flatten();
         let stated = first.filter(|_| {
             self.arguments.method == MethodChoice::AUTHORED && of_clips.all(|other| other == first)
         });
         let stated = stated.map_or(String::new(), |method| format!(" ({method})"));
-        let counted = words::count(tracks, "track");
+        let scalars: usize = (self.work.clips().iter())
+            .map(|clip| clip.set.scalar_count())
+            .sum();
+        let counted = match tracks {
+            0 if scalars > 0 => words::count(scalars, "scalar"),
+            _ => words::count(tracks, "track"),
+        };
         self.reported(&counted, &stated, (tracks, frames, span), written, order)
     }
 
@@ -568,6 +584,7 @@ impl EvaluationJob<'_> {
                  format"
             )));
         }
+        check_whole(self.work)?;
         let end_frame = self.arguments.end_frame.for_document(&*document);
         let end_frame =
             end_frame.map_err(|message| Failure::usage(format!("{name}: {message}")))?;

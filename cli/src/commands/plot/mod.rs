@@ -37,7 +37,7 @@ use crate::commands::plot::subjects::{
     ComponentSelector, PlotQuantity, Subjects, changing_scalars, moving_boxes, together,
 };
 use crate::commands::travel::{self, Maker, is_path_file, is_travel};
-use crate::messages::drawn::{DrawnFile, note_scalars};
+use crate::messages::drawn::{DrawnFile, check_has_tracks, note_scalars};
 use crate::messages::exit::{Failure, for_each};
 use crate::messages::progress::Progress;
 use crate::messages::{listing, names, words};
@@ -238,6 +238,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         let subjects = match arguments.show() {
             PlotQuantity::Scalars => arguments.scalars(&clip, &name)?,
             _ => {
+                check_has_tracks(&name, &clip, "--show scalars draws them")?;
                 note_scalars(&name, &clip);
                 let tracks = arguments.inputs.tracks.of(&clip, &name)?;
                 arguments.subjects(&clip.set, tracks, &name)?

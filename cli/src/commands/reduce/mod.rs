@@ -21,7 +21,8 @@ use crate::arguments::input::Inputs;
 use crate::arguments::options::CommandLine;
 use crate::arguments::output::{one_of, sequence};
 use crate::arguments::results::{
-    ResultArguments, check_sequence, check_stores_keys, document_to_rewrite, makes_new,
+    ResultArguments, check_one_drawn, check_sequence, check_stores_keys, document_to_rewrite,
+    makes_new,
 };
 use crate::arguments::tolerance::{degrees, not_negative};
 use crate::batch::entry::FrameNotes;
@@ -205,6 +206,7 @@ impl Arguments {
             _ => format!("{name} {}", names::clip(clip)),
         };
         let names: Vec<String> = clips.iter().map(name_of).collect();
+        check_one_drawn(plot, name, clips.len())?;
         let mut all = Vec::new();
         for (clip, name) in clips.iter().zip(&names) {
             let together = clip.is_world || !target.format().takes(FormatOption::AtKeys);
@@ -411,7 +413,7 @@ impl Arguments {
             true => makes_new(&self.inputs),
             false => Some("keys at uneven times make"),
         };
-        let document = document_to_rewrite(work, otherwise);
+        let document = document_to_rewrite(work, otherwise)?;
         let indices = clips.iter().map(|clip| clip.index);
         target.write_clips(&sampled, indices, document, &options)
     }

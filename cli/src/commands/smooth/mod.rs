@@ -9,6 +9,7 @@ use std::path::PathBuf;
 use clap::Args;
 use clap::builder::TypedValueParser;
 use glam::Vec3;
+use tumble::reference::angle_between;
 use tumble::{
     EulerSequence, FrameRate, Layout, SampleTimes, Smoothing, SmoothingEnds, SmoothingError,
     SmoothingKernel,
@@ -16,6 +17,7 @@ use tumble::{
 use tumble_formats::diagnostic::{Code, Diagnostic};
 use tumble_formats::format::{Document, MotionOptions, ResultShape};
 use tumble_formats::motion::{Motion, SampledClip};
+use tumble_formats::printable::printable;
 use tumble_formats::sample::Samples;
 use tumble_formats::smooth::{SmoothJob, SmoothMotionError};
 
@@ -23,7 +25,9 @@ use crate::arguments::device::{DeviceArguments, OpenedDevice};
 use crate::arguments::input::Inputs;
 use crate::arguments::options::CommandLine;
 use crate::arguments::output::{one_of, sequence};
-use crate::arguments::results::{ResultArguments, check_sequence, document_to_rewrite, makes_new};
+use crate::arguments::results::{
+    ResultArguments, check_one_drawn, check_sequence, document_to_rewrite, makes_new,
+};
 use crate::batch::pipeline::{ClipWork, EvaluatedResult};
 use crate::batch::preview::PlannedWork;
 use crate::batch::room;
@@ -153,6 +157,7 @@ impl Arguments {
         let clips = clips.iter().map(|&clip| select(clip));
         let clips: Vec<Cow<'_, Motion>> = clips.collect::<Result<_, Failure>>()?;
         let clips: Vec<&Motion> = clips.iter().map(|clip| &**clip).collect();
+        check_one_drawn(plot, name, clips.len())?;
         let samples = clips
             .iter()
             .map(|clip| {
@@ -184,7 +189,7 @@ impl Arguments {
             box_length: loaded.box_length,
             ..target.motion_options()
         };
-        let document = document_to_rewrite(work, makes_new(&self.inputs));
+        let document = document_to_rewrite(work, makes_new(&self.inputs))?;
         let result = (target, options, document);
         let written = write(work, &clips, &samples, result)?.with(plotted);
         let kernels = samples.iter().map(|smoothed| smoothed.kernel.to_string());
@@ -237,17 +242,68 @@ fn smoothed(
             words::seconds(end - last)
         ));
     }
+    if let (SmoothingEnds::Loop, Some(last), Some((_, end))) =
+        (smoothing.ends, last, clip.set.time_span())
+        && end - last > 1e-6
+    {
+        let closing = job
+            .rate
+            .and_then(|rate| rate_with_frame_at(rate, last, end));
+        let remedy = closing.map_or("choose a rate that has one".to_owned(), |rate| {
+            format!("--fps {rate} has one")
+        });
+        return Err(Failure::usage(format!(
+            "{name}: --edges loop needs a sample at the end of the clip, {} s, where the loop closes, and the last is \
+             at {} s; {remedy}",
+            words::seconds(end),
+            words::seconds(last)
+        )));
+    }
     let rotations = clip.set.track_count() * timeline.len();
     let found = device
         .choose(rotations)
         .and_then(|()| device.work(|engine| job.run(engine, clip)))
         .map_err(|error| Failure::evaluating(name, &error))?;
+    if smoothing.ends == SmoothingEnds::Loop {
+        warn_of_open_loop(name, clip, &found.before);
+    }
     Ok(Smoothed {
         before: found.before,
         after: found.after,
         rate: job.rate,
         kernel: job.smoothing.kernel,
     })
+}
+
+/// The lowest multiple of a rate that has a frame at the end of a clip too, which has one at `frame`.
+fn rate_with_frame_at(rate: FrameRate, frame: f64, end: f64) -> Option<FrameRate> {
+    (2..=20).find_map(|factor| {
+        let finer = rate.times(factor).ok()?;
+        let between = (end - frame) * finer.per_second();
+        ((between - between.round()).abs() < 1e-3).then_some(finer)
+    })
+}
+
+/// The largest rotation between the ends of a loop that rounding or a recording explains, in degrees.
+const CLOSED: f64 = 1.0;
+
+/// Warns of the joint that differs most between the first and the last sample, which a loop has equal.
+fn warn_of_open_loop(name: &str, clip: &Motion, samples: &Samples) {
+    let tracks = clip.set.track_count();
+    let last = samples.rotations.len().saturating_sub(tracks);
+    let ends = samples.rotations.iter().zip(&samples.rotations[last..]);
+    let apart = ends.map(|(first, last)| angle_between(first.as_dquat(), last.as_dquat()));
+    let largest = apart
+        .enumerate()
+        .max_by(|(_, one), (_, other)| one.total_cmp(other));
+    if let Some((track, apart)) = largest.filter(|(_, apart)| apart.to_degrees() > CLOSED) {
+        words::warning(&format!(
+            "{name}: --edges loop joins the last sample to the first, and they are up to {:.1}° apart ({}); this is no \
+             loop, or not a whole one",
+            apart.to_degrees(),
+            printable(&clip.set.track_name(track))
+        ));
+    }
 }
 
 /// Writes the rotations of one clip that is nothing else, or clips as a motion file, as `tumble eval` does.

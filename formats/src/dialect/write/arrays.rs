@@ -19,6 +19,7 @@ pub(super) static MJLAB: WrittenDialect = WrittenDialect {
     order: BodyOrder::DepthFirst,
     has_bodies: true,
     names_joints: false,
+    has_degrees: false,
     velocity_at: VelocityPoint::Origin,
     quaternions: Some(ComponentOrder::Wxyz),
     assumed_rate: None,

@@ -21,6 +21,7 @@ pub(super) static GMR: WrittenDialect = WrittenDialect {
     order: BodyOrder::DepthFirst,
     has_bodies: false,
     names_joints: false,
+    has_degrees: false,
     velocity_at: VelocityPoint::Origin,
     quaternions: Some(ComponentOrder::Xyzw),
     assumed_rate: None,

@@ -106,11 +106,14 @@ pub enum CompareError {
     },
     /// No pose of one path has one of the other at its time.
     #[error(
-        "{} and {}: no pose of one lies at a time of the other", inputs[0], inputs[1]
+        "no pose of one lies at a time of the other: {} from {} to {} s, {} from {} to {} s; both need one clock",
+        inputs[0], spans[0][0], spans[0][1], inputs[1], spans[1][0], spans[1][1]
     )]
     NoPoseInBoth {
         /// Names of the clips in messages.
         inputs: [String; 2],
+        /// First and last time of each path, in seconds, on the clock of its file.
+        spans: [[f64; 2]; 2],
     },
     /// The step of relative errors is longer than the path.
     #[error("{} and {}: --rpe is longer than the whole path", inputs[0], inputs[1])]

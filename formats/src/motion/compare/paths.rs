@@ -157,7 +157,14 @@ impl PathDifference {
         });
         let found = associate([&times[0], &times[1]], measure);
         if found.pairs.is_empty() {
-            return Err(CompareError::NoPoseInBoth { inputs: inputs() });
+            return Err(CompareError::NoPoseInBoth {
+                inputs: inputs(),
+                spans: clips.map(|(_, clip, track)| {
+                    let times = clip.set.track(track).times;
+                    let ends = [times.first(), times.last()];
+                    ends.map(|time| clip.time_offset as f64 + time.copied().unwrap_or_default())
+                }),
+            });
         }
         let poses = |side: usize| {
             let (name, clip, track) = clips[side];

@@ -96,7 +96,10 @@ impl Machine<'_> {
     }
 
     /// The state of an array: (version, shape, type, whether in Fortran's order, bytes or a list of objects).
-    pub(in crate::pickle) fn build_numpy_array(&self, state: NodeId) -> Result<Node, Diagnostic> {
+    pub(in crate::pickle) fn build_numpy_array(
+        &mut self,
+        state: NodeId,
+    ) -> Result<Node, Diagnostic> {
         let (shape, dtype, order, data) = match self.items(state) {
             Some(&[_, shape, dtype, order, data]) | Some(&[shape, dtype, order, data]) => {
                 (shape, dtype, order, data)
@@ -127,11 +130,31 @@ impl Machine<'_> {
             );
             return Err(self.damaged(message));
         }
-        Ok(match (&*shape, items) {
+        match (&*shape, items) {
             // An array of one object, as `numpy.save` stores a dict: only the object is kept.
-            ([], &[only]) => Node::Same(only),
-            _ => Node::Same(data),
-        })
+            ([], &[only]) => Ok(Node::Same(only)),
+            ([_, rows @ ..], _) if !rows.is_empty() && count != Some(0) => {
+                let items = items.to_vec();
+                self.charge(items.len(), size_of::<NodeId>())?;
+                self.rows(items, rows)
+            }
+            _ => Ok(Node::Same(data)),
+        }
+    }
+
+    /// Lists of lists, from objects in C order and the lengths of all axes but the first.
+    fn rows(&mut self, objects: Vec<NodeId>, lengths: &[usize]) -> Result<Node, Diagnostic> {
+        let mut level = objects;
+        for &length in lengths.iter().rev() {
+            self.charge(level.len(), size_of::<NodeId>())?;
+            let rows = level.chunks(length).map(<[NodeId]>::to_vec);
+            let rows: Vec<Vec<NodeId>> = rows.collect();
+            level = rows
+                .into_iter()
+                .map(|row| self.new_node(Node::List(row)))
+                .collect::<Result<_, _>>()?;
+        }
+        Ok(Node::List(level))
     }
 
     /// An array, whose bytes must be as many as its shape and its type say.
