@@ -344,7 +344,7 @@ mod tests {
         names
     }
 
-    /// Catches whatever opens the directory by its path again.
+    /// Finds code that opens the directory a second time, by its path.
     #[cfg(unix)]
     #[test]
     fn files_stay_in_the_directory_that_was_opened() {

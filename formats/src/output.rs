@@ -749,7 +749,7 @@ mod tests {
         assert_eq!(names(directory.path()), ["out"]);
     }
 
-    /// Whatever ends the writer of a file without a name leaves nothing.
+    /// A file without a name disappears, however the process ends that writes it.
     #[cfg(target_os = "linux")]
     #[test]
     fn a_file_without_a_name_gets_one_at_the_end() {

@@ -182,7 +182,7 @@ pub(crate) fn filled_bytes(
     if let Ok(array) = array.cast::<PyArrayDyn<f32>>() {
         return filled(array, |numbers| work(bytemuck::cast_slice_mut(numbers)));
     }
-    // Components of 16 bits, whatever they mean.
+    // Both types of 16 bits (f16 and normalised integers) are written as u16.
     let numbers = array.call_method1(intern!(array.py(), "view"), ("uint16",))?;
     let numbers = numbers.cast_into::<PyArrayDyn<u16>>()?;
     let mut memory = numbers.try_readwrite().map_err(refused)?;

@@ -437,8 +437,8 @@ mod tests {
         plain.map_or(KeyCurve::Arcs, |fast| KeyCurve::Cubics(fast.weights))
     }
 
-    /// Every width has the bits of segments, in any part of the frames; what the series does not hold is marked, and is
-    /// not much.
+    /// Every vector width has the bits of segments, in any part of the frames. Samples for which the series is not
+    /// exact enough are marked, and there are few of them.
     #[test]
     fn lanes_of_intervals_have_the_bits_of_segments() {
         let set = &motion(&mut Rng::with_seed(7));

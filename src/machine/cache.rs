@@ -131,7 +131,7 @@ fn is_trusted(_: &fs::Metadata) -> bool {
     true
 }
 
-/// A new file that others cannot write, whatever the mask of the process.
+/// Creates a file that other users cannot write, also if the umask of the process would allow it.
 fn private_file(path: &Path) -> std::io::Result<File> {
     let mut options = File::options();
     options.write(true).create_new(true);

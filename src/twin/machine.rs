@@ -439,7 +439,7 @@ pub(crate) async fn shuffled<T: Stored>(machine: &impl Machine, value: T, lane: 
     T::of_words(&[found])
 }
 
-/// Waits until all lanes have seen what the others show, and shows nothing more.
+/// Waits until all lanes have read the values of the others, then removes the value of this lane.
 async fn hide(machine: &impl Machine) {
     barrier().await;
     machine.show(None);

@@ -35,7 +35,7 @@ use crate::messages::{names, words};
 /// A directory's manifest, open for one batch.
 pub(crate) struct Manifest {
     folder: PathBuf,
-    /// The directory, which stays open: whatever is put in its place meanwhile is not written into.
+    /// The directory, which stays open. If another directory gets its path meanwhile, nothing is written there.
     opened: Folder,
     previous: Arc<BTreeMap<String, ManifestEntry>>,
     /// The results of inputs that earlier batches have not finished.
@@ -631,7 +631,7 @@ mod tests {
         assert_eq!(std::fs::read_dir(directory.path()).unwrap().count(), 0);
     }
 
-    /// Whatever leads to an older manifest keeps its bytes.
+    /// Hard links to an older manifest keep its bytes.
     #[test]
     fn a_manifest_is_replaced_and_never_written_into() {
         let directory = tempfile::tempdir().unwrap();

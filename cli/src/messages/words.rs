@@ -55,7 +55,7 @@ pub(crate) fn warning(message: &str) {
     });
 }
 
-/// One line, whatever names are in it.
+/// Prints a note as one line, also if names in it contain line ends.
 pub(crate) fn note(message: &str) {
     if !is_quiet() {
         line(message);

@@ -241,7 +241,7 @@ fn read_frames<R: BufRead>(lines: &mut Lines<R>) -> Result<u64, Diagnostic> {
 }
 
 /// Reads the rate of `Frame Time: 0.0083333`. With `raw_times` the frame time is the printed number, not that of a common
-/// rate. A rate that replaces it does so whatever the number is.
+/// rate. If another rate replaces it, the number is not checked.
 fn read_rate<R: BufRead>(
     lines: &mut Lines<R>,
     options: &ReadOptions,

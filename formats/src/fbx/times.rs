@@ -73,7 +73,7 @@ pub(super) struct Takes {
     pub(super) others: Vec<String>,
     /// The key times of all curves, a list for each, unless it is that of the curve before.
     pub(super) keys: Vec<Vec<f64>>,
-    /// The rate of these, as in every format: whatever the file says.
+    /// The rate of the key times, found as in every format. The rate that the file states is not used.
     pub(super) rate: Option<FrameRate>,
     /// The frames to which key times belong: those of the file's rate if all keys lie on them.
     pub(super) grid: Option<FrameRate>,

@@ -15,7 +15,7 @@ use crate::parquet::thrift::{Compact, INTEGER, STRUCT};
 /// have 100 bytes, but the times beside them differ and need a byte each.
 const MAX_NUMBERS_PER_BYTE: u64 = 1024;
 
-/// The largest length of a page that is allowed whatever its compressed length. Writers begin a new page after 1 MiB.
+/// Up to this length, a page is allowed without a look at its compressed length. Writers begin a new page after 1 MiB.
 const FREE_PAGE: u64 = 16 << 20;
 
 /// The largest ratio of the length of a longer page to its compressed length.
