@@ -159,7 +159,7 @@ fn an_end_that_a_format_cannot_store_is_refused() {
         ),
         (
             "loop.tum -o out.kitti --end-frame key",
-            "kitti stores the times of its frames in a separate file alone, and none is written; give --times-out",
+            "kitti stores the times of frames only in a separate file, and none is written; give --times-out",
         ),
     ] {
         let arguments = format!("eval --fps 30 {arguments}");

@@ -115,7 +115,7 @@ fn every_trajectory_becomes_every_other() {
     assert!(
         sampled
             .words
-            .contains("poses come at 20 a second, from 1305031098.6 s on"),
+            .contains("the poses are at 20 fps, from 1305031098.6 s on"),
         "{}",
         sampled.words
     );

@@ -62,7 +62,7 @@ pub fn is_refused(error: &io::Error) -> bool {
 
 #[derive(Debug, thiserror::Error)]
 enum OpenRefusal {
-    #[error("leads out of its folder, which is not followed; put the file there itself")]
+    #[error("leads out of its folder and is not followed; put the file itself into the folder")]
     LeadsOut,
     #[error("is not a regular file; give a file")]
     NoFile,

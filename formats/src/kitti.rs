@@ -252,12 +252,14 @@ fn write_motion(
         let are_frames =
             |&rate: &FrameRate| times.iter().enumerate().all(|frame| is_frame(rate, frame));
         let Some(rate) = path.sampled.rate.filter(are_frames) else {
-            let message = "its times are not frames of a rate, and KITTI has no times; give --times-out, a file of them";
+            let message = "its times are not frames of one rate, and KITTI stores no times; write them to a separate \
+                           file with --times-out";
             return Err(path.refuse(message.to_owned()));
         };
         let first = path.sampled.time_digits(0).unwrap_or_default();
         let message = format!(
-            "KITTI has no times; left out: poses come at {rate} a second, from {first} s on (--times-out writes them)"
+            "KITTI stores no times; left out: the poses are at {rate} fps, from {first} s on (--times-out writes the \
+             times)"
         );
         warnings.push(Diagnostic::new(&options.name, Code::NoRoom, message));
     }

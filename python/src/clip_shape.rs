@@ -145,7 +145,7 @@ fn selected(clip: &Motion, joints: &[JointName]) -> Result<Motion, String> {
         // The position relative to the parent would be lost.
         if let Some(parent) = parent(track).filter(|parent| !tracks.contains(parent)) {
             return Err(format!(
-                "tracks: `{}` hangs on `{}`, which is left out; name that joint, too",
+                "tracks: `{}` is a child of `{}`, which is left out; name that joint, too",
                 names[track], names[parent]
             ));
         }

@@ -98,8 +98,8 @@ pub(crate) fn array_of<'py>(
     }
     if !array.is_c_contiguous() {
         return Err(input(
-            "out: its numbers do not lie one behind the other (C order); a view of some of an \
-             array, or a transposed one, cannot be written to",
+            "out: its numbers are not contiguous (C order); a part of an array, or a transposed one, cannot be \
+             written to",
         ));
     }
     let (start, bytes) = (address(out)?, component.bytes());

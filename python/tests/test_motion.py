@@ -408,7 +408,7 @@ def test_a_folder_of_amass_is_shaped_while_it_is_read(tmp_path):
     )
     np.testing.assert_array_equal(by_index.sample(0, times).positions, found.positions)
     for wrong, words in [
-        ({"tracks": ["pelvis", "left_knee"]}, "`left_knee` hangs on `left_hip`, which is left out"),
+        ({"tracks": ["pelvis", "left_knee"]}, "`left_knee` is a child of `left_hip`, which is left out"),
         ({"tracks": ["pelvis", "left_hand"]}, "a_poses.npz: tracks: there is no joint `left_hand`"),
         ({"tracks": [0, 99]}, "there is no joint 99; there are 52"),
         ({"tracks": [0, 0]}, "the joint 0 stands twice"),

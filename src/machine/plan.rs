@@ -447,7 +447,7 @@ impl fmt::Display for Route {
         f.write_str(match self {
             Self::Nothing => "no samples: nothing is computed",
             Self::Rows(Rows::FromKeys(KeyCurve::Arcs)) => {
-                "few samples between keys: each sample is computed from the two keys beside it"
+                "few samples between keys: each sample is computed from the keys before and after it"
             }
             Self::Rows(Rows::FromKeys(KeyCurve::TwoKeys)) => {
                 "fewer samples than keys, two keys per track: each sample is computed from the keys of its track"

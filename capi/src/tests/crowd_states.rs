@@ -435,7 +435,7 @@ fn weights_fades_and_lists_are_checked() {
         fails(
             tumble_crowd_set_visible(crowd, list.as_ptr(), 3),
             argument,
-            "instance 1 is in the list again, at 2",
+            "instance 1 is in the list twice, again at 2",
         );
         fails(
             tumble_crowd_set_visible(crowd, list[3..].as_ptr(), 1),

@@ -91,7 +91,7 @@ impl<'a> Messages<'a> {
 
     fn claims(&self) -> Diagnostic {
         let message = format!(
-            "the file has {} bytes and states that it has more than could be compressed into it; it is damaged",
+            "the file has {} bytes and states more data than could be compressed into them; it is damaged",
             self.bytes.len()
         );
         Diagnostic::new(self.name, Code::TableClaims, message)
@@ -138,7 +138,7 @@ impl<'a> Messages<'a> {
             None => {
                 let found = self.next_of_stream()?;
                 let schema = found.and_then(|(message, _)| message.header_as_schema());
-                let missing = "there is no schema at its beginning; it is not Arrow IPC, or cut";
+                let missing = "it does not begin with a schema; it is not Arrow IPC, or it is cut";
                 schema.ok_or_else(|| self.damaged(missing))?
             }
         };

@@ -202,8 +202,8 @@ impl FrameKeys {
 
 /// Programs that know the rotations of joints and not their positions, as of a body whose shape is not known, write
 /// such files.
-const NO_OFFSETS: &str = "all offsets in the file are 0, so that it does not say where joints are relative to their \
-                          parents; give their places with --offsets";
+const NO_OFFSETS: &str = "all offsets in the file are 0, so the positions of joints relative to their parents are \
+                          unknown; give them with --offsets";
 
 /// The interpolation of a channel, if it has keys.
 fn linear(has_keys: bool) -> Option<ChannelInterpolation> {

@@ -154,7 +154,7 @@ fn check(sampled: &SampledClip<'_>) -> io::Result<Result<FrameRate, String>> {
         ((time - times[0]) * rate.per_second() - frame as f64).abs() > 0.01
     };
     if let Some((_, time)) = times.iter().enumerate().find(|&sample| off(sample)) {
-        let message = format!("the sample at {time} s is not on the next frame of {rate} a second");
+        let message = format!("the sample at {time} s is not at the next frame of {rate} fps");
         return Ok(Err(message));
     }
     Ok(Ok(rate))

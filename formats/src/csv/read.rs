@@ -44,7 +44,7 @@ pub fn read_csv(name: &str, bytes: Vec<u8>, options: &ReadOptions) -> Result<Loa
         return Ok(loaded);
     }
     if options.source_order.is_some() {
-        let message = "the names of the columns say which is which; --source-order is for files without names";
+        let message = "the columns have names, which state the order; --source-order is for files without names";
         return Err(Diagnostic::new(name, Code::Map, message));
     }
     let mut sheet = Sheet {

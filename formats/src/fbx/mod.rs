@@ -893,14 +893,14 @@ impl<'a> Evaluator<'a> {
             Unfollowed::TooManyKeys => (
                 Code::Memory,
                 format!(
-                    "the curves of `{name}` need more than {} keys, for which an input of this length gets no memory; \
-                     is an angle damaged?",
+                    "the curves of `{name}` need more than {} keys, more than the memory limit for an input of this \
+                     length allows; is an angle damaged?",
                     self.follower.max_keys
                 ),
             ),
             Unfollowed::TooMuchWork => (
                 Code::FbxWork,
-                "following the curves takes more work than a file of this length gets; is it damaged?"
+                "following the curves takes more work than is allowed for a file of this length; is it damaged?"
                     .to_owned(),
             ),
         };

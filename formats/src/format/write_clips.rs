@@ -229,8 +229,8 @@ fn loss(
         ),
         Feature::Curves => (
             are_keys(sampled) && bends_by(clip, None),
-            "the smooth curves between the keys (it has lines and arcs; with more frames they are nearer to the \
-             curves)",
+            "the smooth curves between the keys (the format has lines and arcs; with more frames they are nearer to \
+             the curves)",
         ),
         Feature::Bvh => (
             !clip.written_joints.is_empty() && !clip.is_world,

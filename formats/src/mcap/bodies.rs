@@ -223,8 +223,7 @@ fn warn_of_clocks(bodies: &[Body<'_>], warnings: &mut Warnings) {
     warnings.warn(Code::McapClocks, || {
         let (others, log) = (list(of_others), list(of_log));
         let message = format!(
-            "the times of {others} are of another clock than those of {log}; they are not related: choose tracks of \
-             one clock by --tracks"
+            "the times of {others} come from another clock than those of {log}; choose tracks of one clock by --tracks"
         );
         (None, message)
     });
@@ -376,8 +375,8 @@ fn keys(
     if let TimeOrder::Reset { row } = time_order(&stamps) {
         let [before, time] = [row - 1, row].map(|row| stamps[row] as f64 / SECOND as f64);
         let message = format!(
-            "the clock of `{name}` was set back from {before} s to {time} s; what was recorded before and after does \
-             not belong to one time: cut the log there"
+            "the clock of `{name}` was set back from {before} s to {time} s; the parts before and after do not belong \
+             together: cut the log there"
         );
         return Err(body.refuse(file, row, Code::TimeNotIncreasing, message));
     }

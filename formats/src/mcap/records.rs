@@ -165,8 +165,8 @@ impl<'a> Records<'a> {
                     Self::warn_cut(
                         warnings,
                         self.bytes.len() as u64,
-                        "the log was not finished: its end is missing, as of a recording that was interrupted; \
-                         everything that is there is read",
+                        "the end of the log is missing, for example because the recording was interrupted; everything \
+                         before is read",
                     );
                 }
                 return Ok(None);

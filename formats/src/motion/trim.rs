@@ -25,8 +25,8 @@ pub enum TrimError {
     },
     /// A new key at a cut would need the tangents, velocities or tensions that the other keys have.
     #[error(
-        "track {track} (`{name}`) has tangents, velocities or tensions at its keys, and none lies at \
-         {time} s: cut at one of its keys, or sample it (`tumble eval --start --end`)"
+        "track {track} (`{name}`) has tangents, velocities or tensions at its keys, and no key is at {time} s: cut at \
+         one of its keys, or sample it (`tumble eval --start --end`)"
     )]
     NoKeyAtCut {
         /// Index of the first such track, from 0.
@@ -38,7 +38,7 @@ pub enum TrimError {
     },
     /// A new key of a scalar at a cut would need the tangents that its other keys have.
     #[error(
-        "the scalar `{name}` has tangents at its keys, and none lies at {time} s: cut at one of its keys, or sample it \
+        "the scalar `{name}` has tangents at its keys, and no key is at {time} s: cut at one of its keys, or sample it \
          (`tumble eval --start --end`)"
     )]
     NoScalarKeyAtCut {

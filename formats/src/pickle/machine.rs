@@ -464,8 +464,8 @@ impl<'a> Machine<'a> {
             }
             b'P' | b'Q' => Err(self.refuse(
                 Code::PickleForm,
-                "a value lies in another file (a persistent id), which only files of torch.save \
-                 contain with it; save the values themselves"
+                "a value is in another file (a persistent id); only files of torch.save contain such values: save the \
+                 values themselves"
                     .to_owned(),
             )),
             0x97 | 0x98 => Err(self.refuse(

@@ -540,7 +540,7 @@ impl MappedColumns {
             return Ok(());
         };
         let message = format!(
-            "nothing reads `{name}={source}` of --map: no track takes it; say of which track it is, such as \
+            "`{name}={source}` of --map has no effect, because no track uses it; name its track, such as \
              `knee.{name}={source}`, or leave it out"
         );
         Err(names.refuse(Code::Map, message))

@@ -837,7 +837,7 @@ def _check_out(
         if array.dtype != np.float32 or array.shape != expected:
             raise InputError(f"out: its {name} are {array.dtype} {array.shape}; the result's are float32 {expected}")
         if not array.flags.c_contiguous:
-            raise InputError(f"out: the numbers of its {name} do not lie one behind the other (C order)")
+            raise InputError(f"out: the numbers of its {name} are not contiguous (C order)")
         if not array.flags.writeable:
             raise InputError(f"out: its {name} are read-only")
 
