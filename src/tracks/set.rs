@@ -186,7 +186,7 @@ impl TrackSet {
         }
     }
 
-    /// Bytes of such a set.
+    /// The number of bytes of the keys, the times, the tracks and the signs.
     pub(crate) fn rotation_bytes(&self) -> usize {
         size_of_val(&self.keys[..])
             + size_of_val(&self.times[..])

@@ -169,7 +169,7 @@ struct Uses {
 }
 
 impl Uses {
-    /// The last steps that another use needs.
+    /// The last steps for which another use of the resource must wait.
     fn before(&self, by: By, access: Access) -> Last {
         let mut writes = self.writes;
         match access {

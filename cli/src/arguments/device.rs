@@ -97,7 +97,7 @@ const MIN_GPU_ROTATIONS: usize = 1 << 20;
 /// The devices of jobs whose size decides.
 struct ByCost {
     cpu: Engine,
-    /// For large jobs; found when there is one.
+    /// The engine for large jobs, which is opened when the first large job comes.
     large: Option<Engine>,
     options: EngineOptions,
 }

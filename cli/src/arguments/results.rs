@@ -318,7 +318,7 @@ pub(crate) fn check_one_drawn(
     }
 }
 
-/// A destination that is no result of the plan, and can be written.
+/// Refuses a destination that is a result of the plan, or that cannot be written.
 fn apart(destination: Destination, plan: &OutputPlan) -> Result<Destination, Failure> {
     for target in &plan.targets {
         destination.refuse_same(target.path())?;

@@ -88,7 +88,7 @@ impl PlannedResults {
         self.complete.insert(result.to_owned());
     }
 
-    /// Whether this batch gives the result of an input another name than this one, of the same format.
+    /// Whether this batch gives the result of an input another name, in the same format.
     fn is_renamed(&self, input: &str, result: &str) -> bool {
         let ending = |name: &str| Path::new(name).extension().map(ToOwned::to_owned);
         self.of_inputs

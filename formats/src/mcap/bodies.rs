@@ -120,7 +120,7 @@ fn names(bodies: &[Body<'_>]) -> Vec<String> {
     bodies.iter().enumerate().map(name).collect()
 }
 
-/// Replaces stamps of 0 where they stand for no time, and finds transforms that are static.
+/// Replaces stamps of 0 by log times if they mean that there is no stamp, and finds static transforms.
 fn resolve_stamps(bodies: &mut [Body<'_>]) {
     let mut is_stamped: HashMap<usize, bool> = HashMap::new();
     for body in &*bodies {

@@ -87,7 +87,7 @@ mod tests {
         [b"PAR1", &*metadata, &length, b"PAR1"].concat()
     }
 
-    /// Deeper than a thread's stack, or with more columns than there are.
+    /// Schemas that are nested deeper than a thread's stack allows, or that state more columns than they have.
     #[test]
     fn schemas_that_are_too_deep_are_refused() {
         let refusal =

@@ -62,7 +62,7 @@ pub enum LimitRule {
     /// They are reported, and kept.
     #[default]
     Report,
-    /// They become the limit, where the joint does not move.
+    /// Values outside become the limit; there the joint does not move.
     Clamp,
     /// They are an error.
     Refuse,

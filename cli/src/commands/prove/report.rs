@@ -122,7 +122,7 @@ pub(crate) struct KernelSection {
     pub(crate) values: u64,
     /// Those whose bits differ.
     pub(crate) differing: Vec<DifferingValues>,
-    /// Those that did not run.
+    /// The names of those that did not run.
     pub(crate) missing: Vec<String>,
 }
 
