@@ -593,7 +593,9 @@ impl Pairs {
             };
             let name = &to.names[joint];
             let partner = from.named(name).filter(|partner| {
-                let above = pairs.above(to, joint).and_then(|above| pairs.source_of[above]);
+                let above = pairs
+                    .above(to, joint)
+                    .and_then(|above| pairs.source_of[above]);
                 let is_used = pairs.source_of.contains(&Some(*partner));
                 !is_used && above.is_some() && above == pairs.used_above(from, *partner)
             });

@@ -163,7 +163,9 @@ impl BatchSummary {
         let assumed = self.assumed.iter().map(|(count, rate)| {
             let results = words::count(*count, "result");
             let have = if *count == 1 { "has" } else { "have" };
-            format!("{results} {have} {rate} fps, because the keys have no rate (--fps chooses one)")
+            format!(
+                "{results} {have} {rate} fps, because the keys have no rate (--fps chooses one)"
+            )
         });
         assumed.chain(warned).chain(failed).collect()
     }

@@ -9,11 +9,11 @@ use std::path::PathBuf;
 use clap::Args;
 use clap::builder::TypedValueParser;
 use glam::Vec3;
+use tumble::reference::angle_between;
 use tumble::{
     EulerSequence, FrameRate, Layout, SampleTimes, Smoothing, SmoothingEnds, SmoothingError,
     SmoothingKernel,
 };
-use tumble::reference::angle_between;
 use tumble_formats::diagnostic::{Code, Diagnostic};
 use tumble_formats::format::{Document, MotionOptions, ResultShape};
 use tumble_formats::motion::{Motion, SampledClip};
@@ -242,10 +242,13 @@ fn smoothed(
             words::seconds(end - last)
         ));
     }
-    if let (SmoothingEnds::Loop, Some(last), Some((_, end))) = (smoothing.ends, last, clip.set.time_span())
+    if let (SmoothingEnds::Loop, Some(last), Some((_, end))) =
+        (smoothing.ends, last, clip.set.time_span())
         && end - last > 1e-6
     {
-        let closing = job.rate.and_then(|rate| rate_with_frame_at(rate, last, end));
+        let closing = job
+            .rate
+            .and_then(|rate| rate_with_frame_at(rate, last, end));
         let remedy = closing.map_or("choose a rate that has one".to_owned(), |rate| {
             format!("--fps {rate} has one")
         });
