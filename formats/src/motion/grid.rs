@@ -6,7 +6,7 @@
 use tumble::FrameRate;
 
 use crate::motion::Motion;
-use crate::rate::{FrameGrid, Precision, RateSource, frame_time, of, on_frames};
+use crate::rate::{FrameGrid, Precision, RateSource, frame_time, of, of_sums, on_frames};
 
 /// Moves the lists of times of one clip to the frames of the rate that fits all of them. If there is none, each list
 /// is moved to the frames of the rate that fits it, or stays unchanged. Returns the common rate of the keys, if there
@@ -38,8 +38,9 @@ pub(crate) fn restore(lists: &mut [Vec<f64>], precision: Precision) -> Option<Fr
     }
     // Exact times may show a rate that rounded ones did not.
     let again = || of(&RateSource::Times(lists, Precision::F64)).and_then(FrameGrid::rate);
-    let common = common?;
-    common.rate().or_else(again)
+    let rate = common.and_then(|common| common.rate().or_else(again));
+    // Sums of a frame time stay where they are.
+    rate.or_else(|| of_sums(lists).filter(|_| precision == Precision::F32))
 }
 
 /// The fewest keys on successive frames that show that the key at the end alone is between two frames.
@@ -190,7 +191,10 @@ mod tests {
         }
         // Keys set by hand: the last step is a shorter one, like others.
         let mut lists = vec![vec![0.0, 1.0, 2.0, 3.0, 3.5]];
-        assert_eq!(restore(&mut lists, Precision::F64), FrameRate::new(2, 1).ok());
+        assert_eq!(
+            restore(&mut lists, Precision::F64),
+            FrameRate::new(2, 1).ok()
+        );
     }
 
     /// Two keys one step of f32 apart are a cut: rounding must not make one time of them.
