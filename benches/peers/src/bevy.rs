@@ -52,3 +52,10 @@ pub fn sample<C: Curve<bevy_math::Quat> + Sync>(curves: &[C], times: &[f32], out
         }
     });
 }
+
+/// A sample of each curve, on this thread.
+pub fn pose<C: Curve<bevy_math::Quat>>(curves: &[C], time: f32, output: &mut [Quat]) {
+    for (rotation, curve) in output.iter_mut().zip(curves) {
+        *rotation = Quat::from_array(curve.sample_clamped(time).to_array());
+    }
+}

@@ -1,9 +1,11 @@
 //! Tumble beside the Rust libraries that people use today, as one contestant of `run.sh`: 4096 tracks of
-//! 26 uneven keys, 1200 frames, into memory that is used again.
+//! 26 uneven keys, 1200 frames, into memory that is used again; or one pose a call.
 //!
 //! ```text
-//! tumble-peers write KEYS         the keys, for all contestants
-//! tumble-peers race KEYS FOLDER   a line of JSON for each contestant, the first row of its result in FOLDER
+//! tumble-peers write KEYS               the keys, for all contestants
+//! tumble-peers race KEYS FOLDER         a line of JSON for each contestant, the first row of its result in FOLDER
+//! tumble-peers write-poses KEYS         keys and times of the poses, for all contestants
+//! tumble-peers race-poses KEYS FOLDER   a line of JSON for each contestant of poses
 //! ```
 
 #[cfg(feature = "bevy")]
@@ -34,8 +36,6 @@ struct Contestant<'a> {
     name: &'static str,
     work: &'static str,
     threads: &'static str,
-    /// The memory of the keys in the form that it evaluates, where this is compared.
-    bytes_per_key: Option<f64>,
     fill: Box<dyn FnMut(&mut [Quat]) + 'a>,
 }
 
@@ -47,7 +47,11 @@ fn main() {
             let set = unpacked(&fs::read(keys).expect("keys"));
             race(contestants(&set), Path::new(folder));
         }
-        _ => panic!("tumble-peers write KEYS | race KEYS FOLDER"),
+        ["write-poses", keys] => {
+            fs::write(keys, poses::packed()).expect("keys that can be written");
+        }
+        ["race-poses", ..] => poses::race(),
+        _ => panic!("tumble-peers write KEYS | race KEYS FOLDER, or write-poses and race-poses"),
     }
 }
 
@@ -72,7 +76,6 @@ fn contestants(set: &TrackSet) -> Vec<Contestant<'_>> {
             name,
             work,
             threads,
-            bytes_per_key: None,
             fill: Box::new(fill),
         }
     };
@@ -86,7 +89,6 @@ fn contestants(set: &TrackSet) -> Vec<Contestant<'_>> {
             name,
             work,
             threads: "all",
-            bytes_per_key: None,
             fill: Box::new(fill),
         }
     };
@@ -105,7 +107,6 @@ fn contestants(set: &TrackSet) -> Vec<Contestant<'_>> {
             name,
             work,
             threads,
-            bytes_per_key: None,
             fill: Box::new(fill),
         }
     };
@@ -120,7 +121,6 @@ fn contestants(set: &TrackSet) -> Vec<Contestant<'_>> {
         name: "writing memory",
         work: "none",
         threads: "all",
-        bytes_per_key: None,
         fill: Box::new(write),
     };
     let mut first = TrackSet::new();
@@ -172,18 +172,15 @@ fn contestants(set: &TrackSet) -> Vec<Contestant<'_>> {
             name: "Tumble, a kept clip",
             work: one,
             threads: "1",
-            bytes_per_key: None,
             fill: Box::new(one_tumble),
         },
         Contestant {
             name: "glam Quat::slerp, by hand",
             work: one,
             threads: "1",
-            bytes_per_key: None,
             fill: Box::new(one_glam),
         },
     ];
-    contestants.extend(poses::contestants());
     #[cfg(feature = "bevy")]
     {
         let (arcs, hermite) = (bevy::arcs(set), bevy::hermite(set));
@@ -193,7 +190,6 @@ fn contestants(set: &TrackSet) -> Vec<Contestant<'_>> {
             name,
             work: "slerp",
             threads: "all",
-            bytes_per_key: None,
             fill: Box::new(fill),
         });
         let fill = move |output: &mut [Quat]| bevy::sample(&hermite, times, output);
@@ -202,7 +198,6 @@ fn contestants(set: &TrackSet) -> Vec<Contestant<'_>> {
             name,
             work: "smooth",
             threads: "all",
-            bytes_per_key: None,
             fill: Box::new(fill),
         });
     }
@@ -252,13 +247,10 @@ fn race(mut contestants: Vec<Contestant<'_>>, folder: &Path) {
         times.sort();
         let median: Duration = times[times.len() / 2];
         println!(
-            "{{\"name\": {:?}, \"work\": {:?}, \"threads\": {:?}, \"bytes_per_key\": {}, \"ms\": {}, \"row\": {:?}}}",
+            "{{\"name\": {:?}, \"work\": {:?}, \"threads\": {:?}, \"ms\": {}, \"row\": {:?}}}",
             contestant.name,
             contestant.work,
             contestant.threads,
-            contestant
-                .bytes_per_key
-                .map_or("null".to_owned(), |bytes| format!("{bytes:.1}")),
             1e3 * median.as_secs_f64(),
             row(contestant)
         );
