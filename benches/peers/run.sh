@@ -6,7 +6,7 @@
 #   benches/peers/run.sh                prints the tables of docs/figures.md: many samples a call
 #   benches/peers/run.sh --poses        prints the table of docs/speed.md: one pose of 60 joints a call
 #   benches/peers/run.sh --write        writes them there
-#   benches/peers/run.sh --bevy         with Bevy's curves, which take ten minutes to compile
+#   benches/peers/run.sh --bevy         with Bevy's smooth curve, which takes ten minutes to compile
 #   benches/peers/run.sh --rounds 9     turns; 5 by default
 #   benches/peers/run.sh --program X    with the program X too, called as `X KEYS FOLDER`; it prints a line of
 #                                       JSON for each of its rows, as ozz/src/main.rs does
@@ -31,13 +31,25 @@ while [ $# -gt 0 ]; do
     esac
     shift
 done
-[ ${#features[@]} -gt 0 ] || race+=(--missing "Bevy: --bevy")
+[ ${#features[@]} -gt 0 ] || race+=(--missing "Bevy's smooth curve: --bevy")
 
 # build PACKAGE [ARGUMENT ...]: for this machine's vectors
 build() {
     local manifest=benches/peers/$1Cargo.toml && shift
     RUSTFLAGS="-C target-cpu=native" CARGO_TARGET_DIR=$place \
         cargo "$@" build --quiet --release --manifest-path "$manifest" "${features[@]}"
+}
+
+# Version 0.11 is written for a nightly in which `Mask::to_simd` was `to_int`: a copy is compiled with the new name.
+build_ozz() {
+    local manifest=benches/peers/ozz/Cargo.toml source
+    source=$(cargo +nightly metadata --quiet --format-version 1 --manifest-path "$manifest" |
+        "$python" -c 'import json, pathlib, sys
+for package in json.load(sys.stdin)["packages"]:
+    if package["name"] == "ozz-animation-rs": print(pathlib.Path(package["manifest_path"]).parent)') || return 1
+    rm -rf "$place/ozz-animation-rs" && cp -r "$source" "$place/ozz-animation-rs" || return 1
+    sed -i 's/\.to_int()/.to_simd()/' "$place"/ozz-animation-rs/src/*.rs || return 1
+    build ozz/ +nightly --config "patch.crates-io.ozz-animation-rs.path='$place/ozz-animation-rs'"
 }
 
 build ""
@@ -54,11 +66,12 @@ if [ -n "$poses" ]; then
     "$program" write-poses "$place/rows/poses.bin"
     race+=(--poses --program "$program|race-poses")
     features=()
-    if cargo +nightly --version >/dev/null 2>&1; then
-        build ozz/ +nightly
+    if ! cargo +nightly --version >/dev/null 2>&1; then
+        race+=(--missing "ozz-animation-rs: Rust's nightly toolchain is not installed")
+    elif build_ozz 2>"$place/ozz.log"; then
         race+=(--program "$place/release/tumble-peers-ozz")
     else
-        race+=(--missing "ozz-animation-rs: Rust's nightly toolchain is not installed")
+        race+=(--missing "ozz-animation-rs: it does not compile here, see target/race/ozz.log")
     fi
     exec "$python" benches/peers/race.py "$place/rows" "${race[@]}"
 fi

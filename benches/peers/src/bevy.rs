@@ -1,6 +1,7 @@
 //! Bevy's curves, as its animation player samples them: one sample at a time, a search
 //! for each.
 
+#[cfg(feature = "bevy")]
 use bevy_animation::gltf_curves::CubicRotationCurve;
 use bevy_curve::{Curve, UnevenSampleAutoCurve};
 use glam::Quat;
@@ -22,6 +23,7 @@ pub fn arcs(set: &TrackSet) -> Vec<UnevenSampleAutoCurve<bevy_math::Quat>> {
 }
 
 /// With the tangents of the parabola through three keys, component by component.
+#[cfg(feature = "bevy")]
 pub fn hermite(set: &TrackSet) -> Vec<CubicRotationCurve> {
     let curve = |track: Track<'_>| {
         let mut keys: Vec<bevy_math::Vec4> = Vec::new();

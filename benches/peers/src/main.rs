@@ -8,7 +8,6 @@
 //! tumble-peers race-poses KEYS FOLDER   a line of JSON for each contestant of poses
 //! ```
 
-#[cfg(feature = "bevy")]
 mod bevy;
 mod poses;
 mod wide;
@@ -181,24 +180,21 @@ fn contestants(set: &TrackSet) -> Vec<Contestant<'_>> {
             fill: Box::new(one_glam),
         },
     ];
+    let arcs = bevy::arcs(set);
+    contestants.push(Contestant {
+        name: "Bevy UnevenSampleAutoCurve",
+        work: "slerp",
+        threads: "all",
+        fill: Box::new(move |output: &mut [Quat]| bevy::sample(&arcs, times, output)),
+    });
     #[cfg(feature = "bevy")]
     {
-        let (arcs, hermite) = (bevy::arcs(set), bevy::hermite(set));
-        let fill = move |output: &mut [Quat]| bevy::sample(&arcs, times, output);
-        let name = "Bevy UnevenSampleAutoCurve";
+        let hermite = bevy::hermite(set);
         contestants.push(Contestant {
-            name,
-            work: "slerp",
-            threads: "all",
-            fill: Box::new(fill),
-        });
-        let fill = move |output: &mut [Quat]| bevy::sample(&hermite, times, output);
-        let name = "Bevy CubicRotationCurve";
-        contestants.push(Contestant {
-            name,
+            name: "Bevy CubicRotationCurve",
             work: "smooth",
             threads: "all",
-            fill: Box::new(fill),
+            fill: Box::new(move |output: &mut [Quat]| bevy::sample(&hermite, times, output)),
         });
     }
     contestants

@@ -9,6 +9,8 @@ use tumble::crowd::{KeyPrecision, MotionBuilder, MotionStates};
 use tumble::{Device, Engine, EngineOptions, Method, Skeleton, TrackSet, VectorMethod, method};
 use ultraviolet::{Bivec3x8, Rotor3x8, Slerp, f32x8};
 
+use crate::bevy;
+
 const TRACKS: usize = 60;
 const CALLS: usize = 10_000;
 /// The calls that are timed together: less than the time after which a busy machine runs another program, so that the
@@ -288,21 +290,33 @@ impl Poses {
         })
     }
 
+    /// Keys and times in f32.
+    fn bevy(self) -> [Contestant; 2] {
+        let bytes_per_key = 20.0;
+        self.contestants(
+            "Bevy UnevenSampleAutoCurve",
+            Curve::Slerp,
+            bytes_per_key,
+            || {
+                let curves = bevy::arcs(self.set);
+                move |time, output: &mut [Quat]| bevy::pose(&curves, time as f32, output)
+            },
+        )
+    }
+
+    /// The same with two tangents for each key.
     #[cfg(feature = "bevy")]
-    fn bevy(self) -> [[Contestant; 2]; 2] {
-        use crate::bevy;
-        // A time in f32 and a key; with its two tangents.
-        let (linear, cubic) = (20.0, 52.0);
-        let name = "Bevy UnevenSampleAutoCurve";
-        let arcs = self.contestants(name, Curve::Slerp, linear, || {
-            let curves = bevy::arcs(self.set);
-            move |time, output: &mut [Quat]| bevy::pose(&curves, time as f32, output)
-        });
-        let smooth = self.contestants("Bevy CubicRotationCurve", Curve::Smooth, cubic, || {
-            let curves = bevy::hermite(self.set);
-            move |time, output: &mut [Quat]| bevy::pose(&curves, time as f32, output)
-        });
-        [arcs, smooth]
+    fn bevy_smooth(self) -> [Contestant; 2] {
+        let bytes_per_key = 52.0;
+        self.contestants(
+            "Bevy CubicRotationCurve",
+            Curve::Smooth,
+            bytes_per_key,
+            || {
+                let curves = bevy::hermite(self.set);
+                move |time, output: &mut [Quat]| bevy::pose(&curves, time as f32, output)
+            },
+        )
     }
 }
 
@@ -329,10 +343,11 @@ fn contestants() -> Vec<Contestant> {
         poses.tables("Tumble MotionTables, packed keys", KeyPrecision::Packed),
         poses.glam(),
         poses.ultraviolet(),
+        poses.bevy(),
         poses.sampler(segments, Curve::Smooth, smooth, u64::MAX),
         poses.sampler(keys, Curve::Smooth, smooth, 0),
+        #[cfg(feature = "bevy")]
+        poses.bevy_smooth(),
     ];
-    #[cfg(feature = "bevy")]
-    let contestants = contestants.into_iter().chain(poses.bevy());
     contestants.into_iter().flatten().collect()
 }
