@@ -79,7 +79,7 @@ def poses(contestants):
             for times in TIMES:
                 ratio = "" if row is first else f" ({times_as_long(row[times], first[times]):.2g} ×)"
                 # Ten thousand calls in ms are tenths of a microsecond each.
-                cells.append(f"{row[times]['ms'] * 100:.3g}{ratio}")
+                cells.append(f"{row[times]['ms'] * 100:.0f}{ratio}")
             errors = [one["error"] for one in row.values() if one.get("error") is not None]
             error = f"{max(errors):.0e}" if errors else ""
             lines.append(f"| {name} | {row[TIMES[0]]['bytes_per_key']:.3g} | {' | '.join(cells)} | {error} |")

@@ -20,13 +20,14 @@ mkdir -p "$place/rows"
 race=()
 features=()
 poses=
+more=
 while [ $# -gt 0 ]; do
     case "$1" in
     --bevy) features=(--features bevy) ;;
     --poses) poses=1 ;;
     --write) race+=(--write) ;;
     --rounds) race+=(--rounds "$2") && shift ;;
-    --program) race+=(--program "$2") && shift ;;
+    --program) race+=(--program "$2") && more=1 && shift ;;
     *) sed -n '2,15s/^# \?//p' benches/peers/run.sh >&2 && exit 2 ;;
     esac
     shift
@@ -63,6 +64,7 @@ if [ -z "${PEERS_PYTHON:-}" ] && ! "$python" -c 'import numpy, scipy' 2>/dev/nul
 fi
 
 if [ -n "$poses" ]; then
+    [ -n "$more" ] || race+=(--missing "ozz-animation and ACL in C++: --program")
     "$program" write-poses "$place/rows/poses.bin"
     race+=(--poses --program "$program|race-poses")
     features=()

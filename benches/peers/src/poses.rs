@@ -89,8 +89,8 @@ fn reference(keys: &[Quat], time: f64) -> DQuat {
     let [from, to] = [keys[key], keys[key + 1]].map(|key| key.as_dquat().normalize());
     let step = from.conjugate() * if from.dot(to) < 0.0 { -to } else { to };
     let half = step.xyz().length().atan2(step.w);
-    let turn = step.xyz().normalize_or(DVec3::X) * (half * part).sin();
-    from * DQuat::from_xyzw(turn.x, turn.y, turn.z, (half * part).cos())
+    let vector = step.xyz().normalize_or(DVec3::X) * (half * part).sin();
+    from * DQuat::from_xyzw(vector.x, vector.y, vector.z, (half * part).cos())
 }
 
 /// The angle of the rotation between two, exact for small ones.

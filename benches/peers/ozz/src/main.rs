@@ -23,7 +23,7 @@ const TIMED: usize = 100;
 /// The calls whose poses are compared with the reference.
 const CHECKED: usize = 2000;
 
-/// What `tumble-peers write-poses` wrote.
+/// The content of the file that `tumble-peers write-poses` writes.
 pub struct Motion {
     pub tracks: usize,
     pub keys_per_track: usize,
@@ -67,8 +67,8 @@ impl Motion {
         let [from, to] = [first, first + 1].map(|key| self.keys[key].as_dquat().normalize());
         let step = from.conjugate() * if from.dot(to) < 0.0 { -to } else { to };
         let half = step.xyz().length().atan2(step.w);
-        let turn = step.xyz().normalize_or(DVec3::X) * (half * part).sin();
-        from * DQuat::from_xyzw(turn.x, turn.y, turn.z, (half * part).cos())
+        let vector = step.xyz().normalize_or(DVec3::X) * (half * part).sin();
+        from * DQuat::from_xyzw(vector.x, vector.y, vector.z, (half * part).cos())
     }
 }
 
