@@ -26,6 +26,7 @@ mod follow;
 mod interface;
 mod json;
 mod lab;
+mod meaning;
 mod motion;
 mod peers;
 mod plot;

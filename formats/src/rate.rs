@@ -100,6 +100,35 @@ pub(crate) fn of(written: &RateSource<'_>) -> Option<FrameGrid> {
     }
 }
 
+/// The rate whose frame time, added up in f32 from the first time on, gives exactly these times: some exporters do so,
+/// and after some seconds the sums are further from the frames than rounding explains.
+pub(crate) fn of_sums(lists: &[Vec<f64>]) -> Option<FrameRate> {
+    let mut times: Vec<f64> = lists.iter().flatten().copied().collect();
+    times.sort_by(f64::total_cmp);
+    times.dedup();
+    let (&first, &last) = (times.first()?, times.last()?);
+    let mean = (times.len() - 1) as f64 / (last - first);
+    let (whole, ntsc) = (mean.round(), (mean * 1.001).round());
+    let rates = [(whole, 1, 1), (ntsc, 1000, 1001)].map(|(number, frames, seconds)| {
+        let is_searched = (1.0..=MAX_RATE).contains(&number);
+        is_searched.then(|| FrameRate::new(number as u64 * frames, seconds).ok())?
+    });
+    let gives_times = |rate: &FrameRate| {
+        let period = rate.time_of(1) as f32;
+        let sums = std::iter::successors(Some(first as f32), |sum| Some(sum + period));
+        let is_near = |(frame, &time): (usize, &f64)| {
+            let exact = first + rate.time_of(frame as u64);
+            (time - exact).abs() < 0.25 * rate.time_of(1)
+        };
+        let are_sums = times
+            .iter()
+            .zip(sums)
+            .all(|(&time, sum)| time == f64::from(sum));
+        are_sums && times.iter().enumerate().all(is_near)
+    };
+    rates.into_iter().flatten().find(gives_times)
+}
+
 /// Common rates, one of which is chosen if few digits leave several rates open.
 const COMMON_RATES: [u64; 32] = [
     10, 12, 15, 16, 20, 24, 25, 30, 48, 50, 60, 72, 75, 90, 96, 100, 120, 125, 144, 150, 165, 180,
@@ -328,10 +357,6 @@ fn of_times(lists: &[Vec<f64>], precision: Precision) -> Option<FrameGrid> {
         return None;
     }
     let found = of_distinct(&times, precision);
-    let is_rate = found.is_some_and(|found| found.is_rate);
-    if precision == Precision::F32 && !is_rate {
-        return summed(&times).or(found);
-    }
     let Precision::Decimals(_) = precision else {
         return found;
     };
@@ -342,39 +367,6 @@ fn of_times(lists: &[Vec<f64>], precision: Precision) -> Option<FrameGrid> {
         half <= 1e-7 && times.iter().all(digits)
     };
     found.or_else(|| are_f32().then(|| of_distinct(&times, Precision::F32))?)
-}
-
-/// The rate whose frame time, added up in f32 from the first time on, gives exactly these times: some exporters do so,
-/// and after some seconds the sums are further from the frames than rounding explains.
-fn summed(times: &[f64]) -> Option<FrameGrid> {
-    let (first, last) = (times[0], times[times.len() - 1]);
-    let mean = (times.len() - 1) as f64 / (last - first);
-    let whole = mean.round();
-    let ntsc = (mean * 1.001).round();
-    let rates = [(whole, 1, 1), (ntsc, 1000, 1001)].map(|(number, frames, seconds)| {
-        let is_searched = (1.0..=MAX_RATE).contains(&number);
-        is_searched.then(|| FrameRate::new(number as u64 * frames, seconds).ok())?
-    });
-    let gives_times = |rate: &FrameRate| {
-        let period = rate.time_of(1) as f32;
-        let sums = std::iter::successors(Some(first as f32), |sum| Some(sum + period));
-        let is_near = |(frame, time): (usize, f64)| {
-            let exact = first + rate.time_of(frame as u64);
-            (time - exact).abs() < 0.25 * rate.time_of(1)
-        };
-        let are_sums = times
-            .iter()
-            .zip(sums)
-            .all(|(&time, sum)| time == f64::from(sum));
-        are_sums && times.iter().copied().enumerate().all(is_near)
-    };
-    let grid = rates.into_iter().flatten().find(gives_times)?;
-    let is_at_zero = on_frames(std::iter::once(first), grid, 0.0, Precision::F32);
-    Some(FrameGrid {
-        grid,
-        phase: if is_at_zero { 0.0 } else { first },
-        is_rate: true,
-    })
 }
 
 /// The rate of increasing times.

@@ -334,6 +334,17 @@ fn arrays_of_objects_are_read_where_they_may_be() {
         (track.times, track.keys),
         (&[0.5][..], &[Quat::IDENTITY][..])
     );
+    // An array of objects keeps its shape: two keys of four numbers.
+    let poses = objects(
+        "(2, 4)",
+        "(F0.0\nF0.0\nF0.0\nF1.0\nF0.0\nF0.0\nF0.0\nF1.0\nl",
+    );
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("poses.pkl");
+    fs::write(&path, &poses[128..]).unwrap();
+    let entries = open(&path).unwrap().entries();
+    let kinds: Vec<&str> = entries.iter().map(|entry| &*entry.kind).collect();
+    assert_eq!(kinds, ["(2, 4) f8"]);
     let single = read_npy("nested.npy", objects("()", &dict), &ReadOptions::default()).unwrap();
     assert_eq!(single.clips[0].set.track_count(), 1);
 

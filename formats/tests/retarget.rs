@@ -227,6 +227,53 @@ fn a_motion_on_its_skeleton_stays_as_it_is() {
     assert_eq!(report.axes.w, 1.0);
 }
 
+/// Joints that are no parts of a body are paired by name below partners; the others are named.
+#[test]
+fn joints_of_one_name_follow_and_lost_rotations_are_said() {
+    let with = |extra: &[(&str, usize)]| {
+        let mut names = MIXAMO.map(|(name, ..)| name).to_vec();
+        let mut parents = MIXAMO.map(|(_, parent, _)| parent).to_vec();
+        let mut rest = MIXAMO
+            .map(|(.., at)| (DQuat::IDENTITY, DVec3::from_array(at)))
+            .to_vec();
+        for &(name, parent) in extra {
+            names.push(name);
+            parents.push(Some(parent));
+            rest.push((DQuat::IDENTITY, DVec3::Y));
+        }
+        let keys: Vec<DQuat> = (0..2 * names.len())
+            .map(|index| bent(index / names.len(), index % names.len()))
+            .collect();
+        clip(&names, &parents, &rest, &[0.0, 1.0], &keys)
+    };
+    // An ear below the head, a ring below the ear, and a tail that only the source has.
+    let source = with(&[("ear", 5), ("ring", 22), ("tail", 0)]);
+    let target = with(&[("ear", 5), ("ring", 22)]);
+    let (found, report) = retarget(&source, &target, &RetargetOptions::default()).unwrap();
+    for name in ["ear", "ring"] {
+        assert!(
+            report.pairs.contains(&(name.to_owned(), name.to_owned())),
+            "{name}"
+        );
+    }
+    for joint in 0..24 {
+        let [a, b] = [&found, &source].map(|clip| clip.set.track(joint).keys[1].as_dquat());
+        assert!((a.dot(b).abs() - 1.0).abs() < 1e-7, "{joint}");
+    }
+    assert_eq!(report.dropped, ["tail"]);
+    let (joint, degrees) = report.furthest_dropped.unwrap();
+    let expected = [0, 1].map(|k| 2.0 * bent(k, 24).w.abs().min(1.0).acos().to_degrees());
+    assert_eq!(joint, "tail");
+    assert!(
+        (degrees - expected[0].max(expected[1])).abs() < 1e-4,
+        "{degrees} {expected:?}"
+    );
+    // An ear below another joint is another ear.
+    let other = with(&[("ear", 13)]);
+    let (_, report) = retarget(&source, &other, &RetargetOptions::default()).unwrap();
+    assert_eq!(report.resting, ["ear"]);
+}
+
 #[test]
 fn a_smaller_skeleton_with_z_up_walks_as_far_as_its_legs_are_long() {
     let source = mixamo(bent, 3);

@@ -1,6 +1,7 @@
 //! Bevy's curves, as its animation player samples them: one sample at a time, a search
 //! for each.
 
+#[cfg(feature = "bevy")]
 use bevy_animation::gltf_curves::CubicRotationCurve;
 use bevy_curve::{Curve, UnevenSampleAutoCurve};
 use glam::Quat;
@@ -22,6 +23,7 @@ pub fn arcs(set: &TrackSet) -> Vec<UnevenSampleAutoCurve<bevy_math::Quat>> {
 }
 
 /// With the tangents of the parabola through three keys, component by component.
+#[cfg(feature = "bevy")]
 pub fn hermite(set: &TrackSet) -> Vec<CubicRotationCurve> {
     let curve = |track: Track<'_>| {
         let mut keys: Vec<bevy_math::Vec4> = Vec::new();
@@ -51,4 +53,11 @@ pub fn sample<C: Curve<bevy_math::Quat> + Sync>(curves: &[C], times: &[f32], out
             *rotation = Quat::from_array(curve.sample_clamped(time).to_array());
         }
     });
+}
+
+/// A sample of each curve, on this thread.
+pub fn pose<C: Curve<bevy_math::Quat>>(curves: &[C], time: f32, output: &mut [Quat]) {
+    for (rotation, curve) in output.iter_mut().zip(curves) {
+        *rotation = Quat::from_array(curve.sample_clamped(time).to_array());
+    }
 }

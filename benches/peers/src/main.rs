@@ -1,12 +1,13 @@
 //! Tumble beside the Rust libraries that people use today, as one contestant of `run.sh`: 4096 tracks of
-//! 26 uneven keys, 1200 frames, into memory that is used again.
+//! 26 uneven keys, 1200 frames, into memory that is used again; or one pose a call.
 //!
 //! ```text
-//! tumble-peers write KEYS         the keys, for all contestants
-//! tumble-peers race KEYS FOLDER   a line of JSON for each contestant, the first row of its result in FOLDER
+//! tumble-peers write KEYS               the keys, for all contestants
+//! tumble-peers race KEYS FOLDER         a line of JSON for each contestant, the first row of its result in FOLDER
+//! tumble-peers write-poses KEYS         keys and times of the poses, for all contestants
+//! tumble-peers race-poses KEYS FOLDER   a line of JSON for each contestant of poses
 //! ```
 
-#[cfg(feature = "bevy")]
 mod bevy;
 mod poses;
 mod wide;
@@ -34,8 +35,6 @@ struct Contestant<'a> {
     name: &'static str,
     work: &'static str,
     threads: &'static str,
-    /// The memory of the keys in the form that it evaluates, where this is compared.
-    bytes_per_key: Option<f64>,
     fill: Box<dyn FnMut(&mut [Quat]) + 'a>,
 }
 
@@ -47,7 +46,11 @@ fn main() {
             let set = unpacked(&fs::read(keys).expect("keys"));
             race(contestants(&set), Path::new(folder));
         }
-        _ => panic!("tumble-peers write KEYS | race KEYS FOLDER"),
+        ["write-poses", keys] => {
+            fs::write(keys, poses::packed()).expect("keys that can be written");
+        }
+        ["race-poses", ..] => poses::race(),
+        _ => panic!("tumble-peers write KEYS | race KEYS FOLDER, or write-poses and race-poses"),
     }
 }
 
@@ -72,7 +75,6 @@ fn contestants(set: &TrackSet) -> Vec<Contestant<'_>> {
             name,
             work,
             threads,
-            bytes_per_key: None,
             fill: Box::new(fill),
         }
     };
@@ -86,7 +88,6 @@ fn contestants(set: &TrackSet) -> Vec<Contestant<'_>> {
             name,
             work,
             threads: "all",
-            bytes_per_key: None,
             fill: Box::new(fill),
         }
     };
@@ -105,7 +106,6 @@ fn contestants(set: &TrackSet) -> Vec<Contestant<'_>> {
             name,
             work,
             threads,
-            bytes_per_key: None,
             fill: Box::new(fill),
         }
     };
@@ -120,7 +120,6 @@ fn contestants(set: &TrackSet) -> Vec<Contestant<'_>> {
         name: "writing memory",
         work: "none",
         threads: "all",
-        bytes_per_key: None,
         fill: Box::new(write),
     };
     let mut first = TrackSet::new();
@@ -172,38 +171,30 @@ fn contestants(set: &TrackSet) -> Vec<Contestant<'_>> {
             name: "Tumble, a kept clip",
             work: one,
             threads: "1",
-            bytes_per_key: None,
             fill: Box::new(one_tumble),
         },
         Contestant {
             name: "glam Quat::slerp, by hand",
             work: one,
             threads: "1",
-            bytes_per_key: None,
             fill: Box::new(one_glam),
         },
     ];
-    contestants.extend(poses::contestants());
+    let arcs = bevy::arcs(set);
+    contestants.push(Contestant {
+        name: "Bevy UnevenSampleAutoCurve",
+        work: "slerp",
+        threads: "all",
+        fill: Box::new(move |output: &mut [Quat]| bevy::sample(&arcs, times, output)),
+    });
     #[cfg(feature = "bevy")]
     {
-        let (arcs, hermite) = (bevy::arcs(set), bevy::hermite(set));
-        let fill = move |output: &mut [Quat]| bevy::sample(&arcs, times, output);
-        let name = "Bevy UnevenSampleAutoCurve";
+        let hermite = bevy::hermite(set);
         contestants.push(Contestant {
-            name,
-            work: "slerp",
-            threads: "all",
-            bytes_per_key: None,
-            fill: Box::new(fill),
-        });
-        let fill = move |output: &mut [Quat]| bevy::sample(&hermite, times, output);
-        let name = "Bevy CubicRotationCurve";
-        contestants.push(Contestant {
-            name,
+            name: "Bevy CubicRotationCurve",
             work: "smooth",
             threads: "all",
-            bytes_per_key: None,
-            fill: Box::new(fill),
+            fill: Box::new(move |output: &mut [Quat]| bevy::sample(&hermite, times, output)),
         });
     }
     contestants
@@ -252,13 +243,10 @@ fn race(mut contestants: Vec<Contestant<'_>>, folder: &Path) {
         times.sort();
         let median: Duration = times[times.len() / 2];
         println!(
-            "{{\"name\": {:?}, \"work\": {:?}, \"threads\": {:?}, \"bytes_per_key\": {}, \"ms\": {}, \"row\": {:?}}}",
+            "{{\"name\": {:?}, \"work\": {:?}, \"threads\": {:?}, \"ms\": {}, \"row\": {:?}}}",
             contestant.name,
             contestant.work,
             contestant.threads,
-            contestant
-                .bytes_per_key
-                .map_or("null".to_owned(), |bytes| format!("{bytes:.1}")),
             1e3 * median.as_secs_f64(),
             row(contestant)
         );

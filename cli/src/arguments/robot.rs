@@ -182,6 +182,12 @@ impl DialectArguments {
                 dialect.extension()
             )));
         }
+        if self.velocity_at.is_some() && !dialect.has_bodies {
+            return Err(Failure::usage(format!(
+                "--velocity-at has no effect on {}, which has no velocities of bodies; leave it out",
+                dialect.name
+            )));
+        }
         if self.describe && !dialect.takes_descriptions {
             return Err(Failure::usage(format!(
                 "--describe has no effect on {}; leave it out",

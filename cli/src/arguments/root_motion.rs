@@ -13,9 +13,20 @@ use crate::messages::exit::{ALL_INPUTS, Failure};
 /// The axis that points up in a motion.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct VerticalArguments {
-    /// The axis that points up, for headings, contacts and root motion
-    #[arg(long, value_name = "AXIS", default_value = "y", value_parser = vertical())]
-    pub(crate) vertical: Ground,
+    /// The axis that points up, for headings, contacts and root motion [default: z for robots, otherwise y]
+    #[arg(long, value_name = "AXIS", value_parser = vertical())]
+    vertical: Option<Ground>,
+}
+
+impl VerticalArguments {
+    /// The axis that points up in a clip. `is_robot`: the clip is of a robot that the command line names.
+    pub(crate) fn ground(&self, clip: &Motion, is_robot: bool) -> Ground {
+        self.vertical
+            .unwrap_or(match is_robot || clip.robot.is_some() {
+                true => Ground::Z,
+                false => Ground::Y,
+            })
+    }
 }
 
 /// How a root moves in results.
@@ -71,9 +82,10 @@ impl RootMotionArguments {
         self.root_motion
     }
 
-    pub(crate) fn options(&self) -> RootMotionOptions {
+    /// The options for a clip. `is_robot`: the clip is of a robot that the command line names.
+    pub(crate) fn options(&self, clip: &Motion, is_robot: bool) -> RootMotionOptions {
         RootMotionOptions {
-            ground: self.vertical.vertical,
+            ground: self.vertical.ground(clip, is_robot),
             heading: self.heading,
             joint: self.root_joint.clone(),
         }
@@ -95,7 +107,7 @@ impl RootMotionArguments {
 
     /// Refuses to write a file again if its root would need new channels.
     pub(crate) fn check_kept(&self, name: &str, clip: &Motion) -> Result<(), Failure> {
-        let root = root_joint(clip, &self.options());
+        let root = root_joint(clip, &self.options(clip, false));
         let root = root.map_err(|error| self.failure(name, &error))?;
         if clip.root_has_keys(root) {
             return Ok(());

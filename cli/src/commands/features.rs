@@ -8,7 +8,7 @@ use tumble::trees::{BodyOrder, Siblings};
 use tumble::{Device, Engine, FrameRate, SampleTimes};
 use tumble_formats::format::Format;
 use tumble_formats::learning::{
-    ContactLimits, FeatureRequest, FeatureSet, WorldFrames, feature_arrays, write_features,
+    ContactLimits, FeatureRequest, FeatureSet, Ground, WorldFrames, feature_arrays, write_features,
 };
 use tumble_formats::motion::Motion;
 use tumble_formats::retarget::{Role, recognise};
@@ -69,9 +69,9 @@ pub(crate) struct Arguments {
     /// Replace each contact by the majority of this many frames around it, an odd number
     #[arg(long, value_name = "FRAMES", default_value_t = 1)]
     contact_window: usize,
-    /// The axis whose direction the mirror reverses
-    #[arg(long, value_name = "AXIS", default_value = "x", value_parser = mirror_axis())]
-    mirror_axis: usize,
+    /// The axis whose direction the mirror reverses [default: x with y up, y with z up]
+    #[arg(long, value_name = "AXIS", value_parser = mirror_axis())]
+    mirror_axis: Option<usize>,
 }
 
 fn sets() -> impl TypedValueParser<Value = FeatureSet> {
@@ -166,19 +166,24 @@ impl Arguments {
         let rate = self.fps.or(clip.rate).or_else(|| clip.rate_of_keys());
         let rate = rate
             .ok_or_else(|| Failure::usage(format!("{name}: its keys have no rate; give --fps")))?;
-        let poses = match self.inputs.reading.robot()? {
+        let robot = self.inputs.reading.robot()?;
+        let ground = self.vertical.ground(&clip, robot.is_some());
+        let poses = match robot {
             Some(robot) => self.of_robot(name, &clip, &robot, rate, engine)?,
             None => self.of_skeleton(name, &clip, rate, engine)?,
         };
         let request = FeatureRequest {
             sets: self.sets.clone(),
-            ground: self.vertical.vertical,
+            ground,
             limits: ContactLimits {
                 height: self.contact_height,
                 speed: self.contact_speed,
             },
             window: self.contact_window,
-            mirror_axis: self.mirror_axis,
+            mirror_axis: self.mirror_axis.unwrap_or(match ground {
+                Ground::Y => 0,
+                Ground::Z => 1,
+            }),
             humanml3d_joints: joints_of_smpl(&clip, &poses.names),
         };
         let failed =

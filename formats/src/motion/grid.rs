@@ -6,14 +6,20 @@
 use tumble::FrameRate;
 
 use crate::motion::Motion;
-use crate::rate::{FrameGrid, Precision, RateSource, frame_time, of};
+use crate::rate::{FrameGrid, Precision, RateSource, frame_time, of, of_sums, on_frames};
 
 /// Moves the lists of times of one clip to the frames of the rate that fits all of them. If there is none, each list
 /// is moved to the frames of the rate that fits it, or stays unchanged. Returns the common rate of the keys, if there
-/// is one.
+/// is one; the end of a clip may lie between two frames of it ([`frames_before_end`]).
 pub(crate) fn restore(lists: &mut [Vec<f64>], precision: Precision) -> Option<FrameRate> {
     let common = of(&RateSource::Times(lists, precision));
+    let before_end = frames_before_end(lists, precision);
     for list in &mut *lists {
+        if let (None, Some(found)) = (common, before_end) {
+            let count = count_on_frames(list, found);
+            put(&mut list[..count], found);
+            continue;
+        }
         let found =
             common.or_else(|| of(&RateSource::Times(std::slice::from_ref(list), precision)));
         let Some(found) = found else { continue };
@@ -27,10 +33,54 @@ pub(crate) fn restore(lists: &mut [Vec<f64>], precision: Precision) -> Option<Fr
             put(list, found);
         }
     }
+    if let Some(found) = before_end {
+        return found.rate();
+    }
     // Exact times may show a rate that rounded ones did not.
     let again = || of(&RateSource::Times(lists, Precision::F64)).and_then(FrameGrid::rate);
-    let common = common?;
-    common.rate().or_else(again)
+    let rate = common.and_then(|common| common.rate().or_else(again));
+    // Sums of a frame time stay where they are.
+    rate.or_else(|| of_sums(lists).filter(|_| precision == Precision::F32))
+}
+
+/// The fewest keys on successive frames that show that the key at the end alone is between two frames.
+const FRAMES_IN_A_ROW: usize = 8;
+
+/// The frames of clips that end between two of them: a clip of 1.158 s that was evaluated at 60 frames a second has a
+/// key on every frame and one at its end. One of the lists has a key on each of its frames, the others have theirs on
+/// some. `None` if the end is on a frame too, or if there are no such frames.
+pub(crate) fn frames_before_end(lists: &[Vec<f64>], precision: Precision) -> Option<FrameGrid> {
+    let ends = lists.iter().filter_map(|list| list.last().copied());
+    let end = ends.fold(f64::NEG_INFINITY, f64::max);
+    let frames: Vec<Vec<f64>> = lists
+        .iter()
+        .map(|list| match list.split_last() {
+            Some((&last, others)) if last == end => others.to_vec(),
+            _ => list.clone(),
+        })
+        .collect();
+    let most = frames.iter().max_by_key(|list| list.len())?;
+    let (&first, &last) = (most.first()?, most.last()?);
+    // A quick answer for most clips, whose keys are as far apart at the end as before.
+    let mean = (last - first) / (most.len() - 1) as f64;
+    let is_short = (0.0..0.999 * mean).contains(&(end - last));
+    if most.len() < FRAMES_IN_A_ROW || !is_short || end == last {
+        return None;
+    }
+    let found = of(&RateSource::Times(&frames, precision)).filter(|found| found.is_rate)?;
+    let count = ((last - first) * found.grid.per_second()).round() as usize + 1;
+    let is_between = !on_frames(std::iter::once(end), found.grid, found.phase, precision);
+    (count == most.len() && is_between).then_some(found)
+}
+
+/// How many times of a list are on frames: all, or all but that of the clip's end.
+fn count_on_frames(list: &[f64], frames: FrameGrid) -> usize {
+    let is_between = |time: f64| {
+        let off = (time - frame_time(frames.grid, frames.phase, time)).abs();
+        off * frames.grid.per_second() > 1e-3
+    };
+    let ends_between = list.last().is_some_and(|&last| is_between(last));
+    list.len() - usize::from(ends_between)
 }
 
 /// Moves times to frames. Different times stay different: if two belong to the same frame, as an exporter writes a
@@ -71,7 +121,10 @@ impl Motion {
                 all.push(list.to_vec());
             }
         }
-        of(&RateSource::Times(&all, Precision::F64))?.rate()
+        let before_end = frames_before_end(&all, Precision::F64);
+        before_end
+            .or_else(|| of(&RateSource::Times(&all, Precision::F64)))?
+            .rate()
     }
 }
 
@@ -122,6 +175,26 @@ mod tests {
             FrameRate::new(30, 1).ok()
         );
         assert_eq!(lists[0], [-1.0 / 30.0, 0.0, 10.0 / 30.0, 11.0 / 30.0]);
+    }
+
+    #[test]
+    fn a_clip_may_end_between_two_frames() {
+        for (rate, frames, end) in [(60u32, 70, 139.0 / 120.0), (30, 30, 0.98), (25, 9, 0.3501)] {
+            let mut times = rounded(0..frames, f64::from(rate));
+            times.push(f64::from(end as f32));
+            let mut lists = vec![times, rounded([0, 3].into_iter(), f64::from(rate))];
+            let found = restore(&mut lists, Precision::F32);
+            assert_eq!(found, FrameRate::new(u64::from(rate), 1).ok(), "{rate}");
+            assert_eq!(lists[0][7], 7.0 / f64::from(rate));
+            assert_eq!(lists[1][1], 3.0 / f64::from(rate));
+            assert!((lists[0].last().unwrap() - end).abs() < 1e-7);
+        }
+        // Keys set by hand: the last step is a shorter one, like others.
+        let mut lists = vec![vec![0.0, 1.0, 2.0, 3.0, 3.5]];
+        assert_eq!(
+            restore(&mut lists, Precision::F64),
+            FrameRate::new(2, 1).ok()
+        );
     }
 
     /// Two keys one step of f32 apart are a cut: rounding must not make one time of them.

@@ -323,6 +323,13 @@ fn choose(
     let by_name = names_joints
         .then(|| joints_by_name(tree, &names, refuse))
         .transpose()?;
+    if names.is_empty() && tree.counts().scalars > 0 {
+        return Err(refuse(
+            "the file has no angles of joints: it is no motion of a robot, and motions of people are not carried to \
+             robots"
+                .to_owned(),
+        ));
+    }
     if by_name.is_none() && names.len() != tree.counts().scalars {
         let joints: Vec<&str> = tree.scalar_joints().map(|joint| &*joint.name).collect();
         let all = tree.bodies().iter().flat_map(|body| &body.joints);

@@ -365,7 +365,10 @@ impl<'a> Reader<'a> {
             axis,
             anchor: frame.position + frame.rotation * vector("pos", DVec3::ZERO)?,
             reference,
-            limits: range.filter(|_| is_limited),
+            limits: match range.filter(|_| is_limited) {
+                Some(range) => Some(documents.limits(element, range)?),
+                None => None,
+            },
             mimic: None,
         })
     }

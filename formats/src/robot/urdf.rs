@@ -191,7 +191,10 @@ fn joint(documents: &Documents<'_>, element: Element) -> Result<Option<TreeJoint
         Ok(list.map_or(default, |[number]| number))
     };
     let limits = match child("limit").filter(|_| matches!(kind, "revolute" | "prismatic")) {
-        Some(limit) => Some([number(limit, "lower", 0.0)?, number(limit, "upper", 0.0)?]),
+        Some(limit) => {
+            let both = [number(limit, "lower", 0.0)?, number(limit, "upper", 0.0)?];
+            Some(documents.limits(limit, both)?)
+        }
         None => None,
     };
     let mimic = match child("mimic").filter(|_| has_axis) {

@@ -369,6 +369,20 @@ impl<'a> Documents<'a> {
             .map_or(DVec3::ZERO, DVec3::from_array))
     }
 
+    /// The limits of a joint, the smaller first.
+    pub(super) fn limits(
+        &self,
+        element: Element,
+        limits: [f64; 2],
+    ) -> Result<[f64; 2], Diagnostic> {
+        let [low, high] = limits;
+        if low <= high {
+            return Ok(limits);
+        }
+        let message = format!("the limits are {low} and {high}; the smaller comes first");
+        Err(self.refuse(element, Code::RobotTree, message))
+    }
+
     /// A vector of length 1.
     pub(super) fn unit(
         &self,

@@ -476,7 +476,8 @@ impl EvaluationJob<'_> {
         let engine = Engine::new(Device::Cpu).map_err(|error| Failure::evaluating(name, &error))?;
         let samples = track_samples(clip, &engine);
         let samples = samples.map_err(|error| Failure::evaluating(name, &error))?;
-        let treated = keys_with_root_motion(clip, &samples, &root.options(), root.rule());
+        let options = root.options(clip, self.arguments.inputs.reading.robot()?.is_some());
+        let treated = keys_with_root_motion(clip, &samples, &options, root.rule());
         treated
             .map(Cow::Owned)
             .map_err(|error| root.failure(name, &error))
@@ -637,7 +638,8 @@ impl EvaluationJob<'_> {
                 all.push((Cow::Borrowed(*clip), found));
                 continue;
             }
-            let treated = with_root_motion(clip, &found, &root.options(), root.rule());
+            let options = root.options(clip, self.arguments.inputs.reading.robot()?.is_some());
+            let treated = with_root_motion(clip, &found, &options, root.rule());
             let (clip, found) = treated.map_err(|error| root.failure(name, &error))?;
             all.push((Cow::Owned(clip), found));
         }

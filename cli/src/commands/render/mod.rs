@@ -32,7 +32,7 @@ use crate::commands::render::film::apng::Apng;
 use crate::commands::render::film::gif::Gif;
 use crate::commands::render::scene::{Actor, CameraView, Scene, Style, Surroundings, Theme};
 use crate::commands::travel::{Maker, Scenery, TravelSource, is_path_file, is_travel};
-use crate::messages::drawn::{DrawnFile, note_scalars};
+use crate::messages::drawn::{DrawnFile, check_has_tracks, note_scalars};
 use crate::messages::exit::Failure;
 use crate::messages::progress::Progress;
 use crate::messages::{listing, names, signals, words};
@@ -284,6 +284,7 @@ impl Arguments {
             document,
             rest,
         } = self.inputs.load_one(path)?;
+        check_has_tracks(name, &clip, "`tumble plot --show scalars` draws them")?;
         note_scalars(name, &clip);
         let clip = match clip.is_chain() {
             _ if is_travel(&clip) => tracks.select(&clip, name)?.into_owned(),

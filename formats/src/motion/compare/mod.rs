@@ -104,6 +104,12 @@ pub enum CompareError {
         /// First and last common time, in seconds, on the clock of the first clip.
         common: [f64; 2],
     },
+    /// A path has rotations alone.
+    #[error("{input} has no positions; leave out --ape and --rpe to compare the rotations")]
+    NoPositions {
+        /// Name of the clip in messages.
+        input: String,
+    },
     /// No pose of one path has one of the other at its time.
     #[error(
         "no pose of one lies at a time of the other: {} from {} to {} s, {} from {} to {} s; both need one clock",

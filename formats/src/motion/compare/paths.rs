@@ -1,7 +1,7 @@
 //! Compares an estimated path with its reference: errors after an alignment, at the poses of the sparser of both.
 
 use serde::Serialize;
-use tumble::{Engine, SampleTimes, method};
+use tumble::{Channel, Engine, SampleTimes, method};
 
 use crate::motion::Motion;
 use crate::motion::compare::CompareError;
@@ -146,6 +146,13 @@ impl PathDifference {
         if clips.iter().all(|(_, clip, _)| clip.set.track_count() > 1) {
             let motions = clips.map(|(_, clip, _)| clip);
             check_known_parents(names, motions, &[clips.map(|(_, _, track)| track)])?;
+        }
+        for (input, clip, track) in clips {
+            let moves = clip.set.vector_keys(Channel::Translation, track).is_some();
+            if !moves && clip.skeleton.is_empty() {
+                let input = input.to_owned();
+                return Err(CompareError::NoPositions { input });
+            }
         }
         // Each clip has its own time offset, in whole seconds.
         let shift = (first.time_offset - clips[1].1.time_offset) as f64;

@@ -210,15 +210,18 @@ impl ArchivePlan {
         let found = if is_f32 && !options.raw_times {
             grid::restore(std::slice::from_mut(&mut times), precision)
         } else {
-            let times = RateSource::Times(std::slice::from_ref(&times), precision);
-            of(&times).and_then(crate::rate::FrameGrid::rate)
+            let lists = std::slice::from_ref(&times);
+            let before_end = grid::frames_before_end(lists, precision);
+            let found = before_end.or_else(|| of(&RateSource::Times(lists, precision)));
+            found.and_then(crate::rate::FrameGrid::rate)
         };
         if let (Some(first), None, Some(found), false) = (self.rate, said, found, ends_between) {
             self.two_rates = Some(format!(
                 "the file states {first} frames a second, but its times have {found}; the times are used"
             ));
         }
-        self.rate = said.or(found);
+        let between = self.rate.filter(|_| ends_between);
+        self.rate = said.or(between).or(found);
         Ok(times)
     }
 }
