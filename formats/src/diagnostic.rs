@@ -279,7 +279,7 @@ codes! {
     McapRoute = "E804" elsewhere, "a path without times", "All poses of a path have the same stamp, as a planner writes a route. A route has no times; `tumble follow` moves a body along one.";
     // E9xx and W9xx: robots.
     RobotXml = "E900" elsewhere, "an XML file that cannot be read", "A robot's file is well-formed XML in UTF-8 without a document type definition, at most 4 MiB with the files that it includes.";
-    RobotTree = "E901" elsewhere, "a robot that is no tree", "Its bodies are trees, each body and joint has its own name, and each element has the attributes that it needs; of the limits of a joint the smaller comes first.";
+    RobotTree = "E901" elsewhere, "a robot that is no tree", "Its bodies are trees, each body and joint has its own name, and each element has the attributes that it needs. Of the two limits of a joint, the smaller one comes first.";
     RobotInclude = "E902" elsewhere, "an include that is not followed", "An MJCF includes each file once, and only files in its folder and below.";
     RobotElement = "E903" elsewhere, "an element that is not read", "The element would create or move bodies by rules that are not supported; the message names an alternative.";
     JointsDoNotFit = "E904" elsewhere, "joints that are not the robot's", "The file names joints that the robot of `--robot` does not have, or has more or fewer joints without naming them. Robots of one name exist in versions with different joints.";
