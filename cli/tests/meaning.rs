@@ -374,6 +374,14 @@ fn a_dry_run_names_what_failed_before() {
         text.contains("1 result would be made (1 of inputs that failed in the last run)"),
         "{text}"
     );
+    // An input that cannot be read any more has a result of other bytes.
+    fs::write(folder.join("in/a.dat"), "# 2 3\n0 1 0 0\n").unwrap();
+    let again = run(folder, &words("eval in -o out --resume --device cpu"));
+    says(
+        &again,
+        "1 failed input has a result of an earlier run, made from other bytes, which stay: out/a.npy is the first",
+    );
+    fs::copy(folder.join("b.dat"), folder.join("in/a.dat")).unwrap();
     fs::remove_file(folder.join("out/a.npy")).unwrap();
     let check = run(folder, &words("check out"));
     says(&check, "1 of 1 result missing or unreadable");

@@ -120,7 +120,10 @@ pub(crate) fn of_sums(lists: &[Vec<f64>]) -> Option<FrameRate> {
             let exact = first + rate.time_of(frame as u64);
             (time - exact).abs() < 0.25 * rate.time_of(1)
         };
-        let are_sums = times.iter().zip(sums).all(|(&time, sum)| time == f64::from(sum));
+        let are_sums = times
+            .iter()
+            .zip(sums)
+            .all(|(&time, sum)| time == f64::from(sum));
         are_sums && times.iter().enumerate().all(is_near)
     };
     rates.into_iter().flatten().find(gives_times)
