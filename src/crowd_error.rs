@@ -138,7 +138,7 @@ pub enum CrowdError {
     },
     /// An instance is in a list twice.
     #[error(
-        "instance {instance} is in the list again, at {position}; a list of visible instances names each once"
+        "instance {instance} is in the list twice, again at {position}; a list of visible instances contains each once"
     )]
     Repeated {
         /// The instance's index.

@@ -103,7 +103,7 @@ mod pose;
 mod prepare;
 pub mod reduce;
 pub mod reference;
-// Without `vulkan`, kernels are not run, and some of this is unused.
+// Without the feature `vulkan`, kernels do not run, and some of this is unused.
 #[cfg_attr(not(feature = "vulkan"), allow(dead_code))]
 mod shader;
 mod simd;

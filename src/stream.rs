@@ -73,7 +73,7 @@ pub(crate) fn run<E: From<Error>>(
         fill(&window, &mut rotations[..window.len()])?;
         Ok((window, rotations))
     };
-    // One chunk has nothing to overlap with.
+    // With a single chunk, there is no work that could be done at the same time.
     if let [Some(window), None] = first {
         let none = OutputBuffer::new(0).map_err(Error::from)?;
         let (window, rotations) = fill_one(window, none)?;
@@ -98,7 +98,7 @@ pub(crate) fn run<E: From<Error>>(
         for _ in 0..BUFFERS {
             let _ = give_back.send(OutputBuffer::new(0).map_err(Error::from)?); // it has room
         }
-        // It stops after an error, or when the receiver is gone.
+        // The loop ends after an error, or when the receiver was dropped.
         let fill_all = move || {
             windows.try_for_each(|window| {
                 let filled = fill_one(window, empty.recv().ok()?);

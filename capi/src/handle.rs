@@ -74,7 +74,7 @@ pub(crate) fn free<T: Object>(handle: *mut T) -> Result<(), Failure> {
         return Ok(());
     }
     get::<T>(handle)?;
-    // Dropped after the table is let go: objects may wait for a device.
+    // Dropped after the lock of the table is released, because dropping an object may wait for a device.
     let object = write().objects.remove(&handle.addr());
     drop(object);
     Ok(())

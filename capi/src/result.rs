@@ -240,7 +240,7 @@ fn remember(message: &str) {
 
 /// The result of some work. If it fails or panics, the code of the error, whose message is stored for this thread.
 pub(crate) fn guarded<T>(work: impl FnOnce() -> Result<T, Failure>) -> Result<T, TumbleResult> {
-    // Values that a panic leaves half done are dropped, or lie behind a lock that is then poisoned.
+    // After a panic, values that are half changed are dropped, or their lock is poisoned, so nobody can use them.
     let done = catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| Err(of_panic(&*panic)));
     done.map_err(|failure| {
         remember(&failure.message);

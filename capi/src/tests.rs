@@ -417,7 +417,7 @@ fn structures_of_older_versions_are_taken() {
             memory: 1 << 30,
             threads: 1,
             allow_inexact: 0,
-            // Behind an older structure lies anything.
+            // The memory after an older structure may contain anything.
             cache_directory: std::ptr::without_provenance(1),
         };
         let mut engine = null_mut();

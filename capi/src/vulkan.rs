@@ -142,7 +142,7 @@ impl TumbleVulkan {
                 get_instance_proc_addr,
             })
         };
-        // A function that is not there would end the program when it is called.
+        // A null function pointer would crash the program when it is called.
         let needed: [&CStr; 3] = [
             c"vkEnumeratePhysicalDevices",
             c"vkGetPhysicalDeviceProperties2",

@@ -295,7 +295,7 @@ fn crowds_in_c_have_the_same_bytes_on_the_cpu_and_a_device() {
     let Some(first) = first else {
         return;
     };
-    // Frames differ from one another.
+    // All frames have different hashes.
     let mut hashes: Vec<&str> = first
         .lines()
         .filter_map(|line| line.split(' ').nth(3))

@@ -260,7 +260,7 @@ fn frames_are_recorded_into_an_applications_commands() {
             let found = application.bytes(memory, 256 + size);
             assert!(found[256..] == *expected_frame, "{output:?}");
         }
-        // The engine works into the host's memory too.
+        // The engine can also write into the host's memory.
         assert!(evaluated(recorded, output.0, output.1) == expected_bits[FRAMES - 1]);
         // A frame that is thrown away is reported to the crowd.
         let last = FRAMES;
@@ -280,7 +280,7 @@ fn frames_are_recorded_into_an_applications_commands() {
             "{output:?}"
         );
 
-        // Another crowd's target, and no commands, are refused; so is a target that was freed.
+        // Refused: a target of another crowd, a null command buffer, and a target that was freed.
         let other = crowd(engine, library);
         // SAFETY: nothing is recorded.
         unsafe {
@@ -541,7 +541,7 @@ fn clips_are_recorded_into_an_applications_commands() {
             let expected = requested(expected, request);
             assert!(requested(recorded, request) == expected);
             let size = expected.len() as u64;
-            // A multiple of the bytes of a value of every encoding.
+            // Divisible by the size of a value in every encoding.
             const VALUES: u64 = 144;
             let second = size.next_multiple_of(VALUES);
             let (buffer, memory) = application.buffer(VALUES + second + size);
@@ -568,7 +568,7 @@ fn clips_are_recorded_into_an_applications_commands() {
         done(tumble_clip_free(expected));
     }
 
-    // Ranges that are too short, and buffers, structures and handles that are missing.
+    // Refused: ranges that are too short, and null buffers, structures and handles.
     let (clip, of_cpu) = (upload(engine, null()), upload(cpu, null()));
     let size = requested(of_cpu, &whole).len() as u64;
     let (buffer, memory) = application.buffer(16 + size);

@@ -113,7 +113,7 @@ fn load_elsewhere(seconds: u64) -> Option<VulkanError> {
         match child.try_wait() {
             Ok(Some(status)) => {
                 let mut said = String::new();
-                // A driver may have written much beside it, or left a process that holds the pipe open.
+                // A driver may have printed a lot, or may have left a process that keeps the pipe open.
                 let out = child.stdout.take().map(|out| out.take(MAX_OUTPUT));
                 let _ = out.map(|mut out| out.read_to_string(&mut said));
                 return failure_of(status, said.contains(LOADED));

@@ -73,7 +73,7 @@ pub fn main() -> ExitCode {
     let thread = std::thread::Builder::new()
         .name("main".to_owned())
         .stack_size(STACK);
-    // Where no thread can be started, this one does.
+    // If no thread can be started, run on this thread.
     let code = match thread.spawn(run) {
         Ok(thread) => thread.join().unwrap_or(BUG),
         Err(_) => run(),

@@ -514,7 +514,7 @@ pub fn manifest_results(text: &str) -> Vec<(String, String, u64)> {
 #[must_use]
 pub fn manifest_by_input(text: &str) -> BTreeMap<String, Vec<String>> {
     let mut found: BTreeMap<String, Vec<String>> = BTreeMap::new();
-    // The results of an input of which a part failed are not all.
+    // If a part of an input failed, the results of this input are incomplete.
     let unfinished = ManifestLines::parse(text.as_bytes()).inputs;
     for entry in entries_of(text) {
         if unfinished.contains_key(entry.whole().0) {

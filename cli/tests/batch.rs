@@ -665,7 +665,7 @@ fn directories_may_have_anything() {
     ];
     let made = succeed(folder, &line);
     for expected in [
-        "walks/old/up: is a link to walks, a directory that it is in; not followed",
+        "walks/old/up: is a link to walks, the directory that contains it; not followed",
         "walks/round.dat: is a link in a circle of links; not followed",
         "walks/pipe.dat: is a named pipe; skipped (--pipes reads it)",
         "walks/s.dat: is a socket; skipped",

@@ -123,8 +123,8 @@ fn an_end_that_is_moved_or_left_out_is_told() {
         )
     };
     let words = eval("out.bvh");
-    let expected = "out.bvh: warning[W210]: the clip ends at 1.125 s, between two frames of 30 a second; one frame \
-                    more, at 1.133333 s, has the value of the end";
+    let expected = "out.bvh: warning[W210]: the clip ends at 1.125 s, between two frames at 30 fps; one more frame, \
+                    at 1.133333 s, has the value of the end";
     assert!(words.contains(expected), "{words}");
     let words = eval("out.npy");
     let expected = "1 track × 34 frames (the 0.025 s after the last one are left out), ";
@@ -159,7 +159,7 @@ fn an_end_that_a_format_cannot_store_is_refused() {
         ),
         (
             "loop.tum -o out.kitti --end-frame key",
-            "kitti stores the times of its frames in a separate file alone, and none is written; give --times-out",
+            "kitti stores the times of frames only in a separate file, and none is written; give --times-out",
         ),
     ] {
         let arguments = format!("eval --fps 30 {arguments}");

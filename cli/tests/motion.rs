@@ -598,7 +598,7 @@ fn one_name_of_two_animations_is_refused_with_their_places() {
     let run = refused(folder, "eval two.gltf --animation Walk -o out.npy");
     assert!(
         run.words
-            .contains("2 animations `Walk`, at the indices 0 and 1"),
+            .contains("2 animations called `Walk`, at the indices 0 and 1"),
         "{}",
         run.words
     );

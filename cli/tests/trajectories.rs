@@ -115,7 +115,7 @@ fn every_trajectory_becomes_every_other() {
     assert!(
         sampled
             .words
-            .contains("poses come at 20 a second, from 1305031098.6 s on"),
+            .contains("the poses are at 20 fps, from 1305031098.6 s on"),
         "{}",
         sampled.words
     );
@@ -310,7 +310,7 @@ fn messages_have_the_clock_of_the_file() {
         ("reduce path.tum -o r.tum", "(body, 1305031098.600 s)"),
         (
             "eval path.tum --fps 7 -o a.bvh",
-            "the clip ends at 1305031099.3 s, between two frames of 7 a second; one frame more, at 1305031099.314286 s",
+            "the clip ends at 1305031099.3 s, between two frames at 7 fps; one more frame, at 1305031099.314286 s",
         ),
         (
             "verify path.tum -m slerp --fps 4 --device cpu",

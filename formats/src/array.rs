@@ -118,7 +118,7 @@ impl ArrayHeader {
         let mut next = 1;
         let mut set = |axis: usize| {
             strides[axis] = next;
-            // Saturates only beside a length of 0, where there is no number to find.
+            // This can only saturate if another length is 0, and then there are no numbers to find.
             next = usize::saturating_mul(next, self.shape[axis].max(1));
         };
         match self.is_fortran {

@@ -62,7 +62,7 @@ pub fn is_refused(error: &io::Error) -> bool {
 
 #[derive(Debug, thiserror::Error)]
 enum OpenRefusal {
-    #[error("leads out of its folder, which is not followed; put the file there itself")]
+    #[error("leads out of its folder and is not followed; put the file itself into the folder")]
     LeadsOut,
     #[error("is not a regular file; give a file")]
     NoFile,
@@ -110,12 +110,12 @@ fn open(folder: &Path, name: &Path) -> io::Result<File> {
     for _ in 0..100 {
         match openat2(&root, name, flags, Mode::empty(), resolve) {
             Ok(file) => return Ok(File::from(file)),
-            // Something was renamed meanwhile.
+            // A part of the path was renamed while it was opened: try again.
             Err(Errno::AGAIN) => {}
             Err(Errno::XDEV | Errno::LOOP) => return Err(leads_out()),
             // A socket, or a device without a driver.
             Err(Errno::NXIO | Errno::NODEV) => return Err(no_file()),
-            // Before Linux 5.6, or where a sandbox knows no such call.
+            // The call does not exist before Linux 5.6, and some sandboxes forbid it.
             Err(Errno::NOSYS | Errno::PERM) => break,
             Err(error) => return Err(error.into()),
         }

@@ -253,7 +253,7 @@ impl DatKeys {
             self.check_columns(lines, line)?;
         }
         self.times.push(time);
-        // A file that stops in the middle of its last number reads as a whole one.
+        // If a file is cut within its last number, the rest may still be a valid number.
         let (column, digits) = row.last;
         if !lines.ended && digits < row.fewest_digits {
             let message = "the file ends in the middle of a line, and its last number is shorter \
@@ -331,7 +331,7 @@ impl DatKeys {
             );
             lines.warn(column, Code::NormOff, message);
         }
-        // Small rotations, w last: the last number is nearly 1, the first nearly 0.
+        // Small rotations with w last: the last number is near 1, the first near 0.
         self.total += 1;
         if key.z.abs() > 0.9 && key.w.abs() < 0.3 {
             self.w_last += 1;
@@ -342,7 +342,7 @@ impl DatKeys {
             Some(previous) => {
                 if dot(*previous, exact).abs() <= HALF_TURN_PRODUCT {
                     let message = format!(
-                        "box {} turns by exactly 180° from the previous key; the signs decide the direction",
+                        "box {} is rotated by exactly 180° from the previous key; the signs decide the direction",
                         index + 1
                     );
                     lines.warn(column, Code::HalfTurn, message);

@@ -94,7 +94,7 @@ impl Decimal {
         if digits.is_empty() {
             return Some(Self(0));
         }
-        // An exponent that does not fit into i32 means out of range, or 0.
+        // If the exponent does not fit into i32, the number is out of range, or 0.
         let exponent = match exponent.parse::<i32>() {
             Ok(exponent) => exponent,
             Err(_) if exponent.starts_with('-') => return Some(Self(0)),
@@ -122,7 +122,7 @@ impl Decimal {
 
     /// The sum of whole seconds and a time with its shortest decimals; `None` outside ±1e14.
     pub(crate) fn of(whole: i64, time: f64) -> Option<Self> {
-        // Seconds behind the first of all times may be twice as many as a time has.
+        // The difference to the first time may have twice as many whole digits as a time.
         let digits = time.to_string();
         let (seconds, decimals) = digits.split_once('.').unwrap_or((&digits, "0"));
         let seconds = i128::from(whole) + seconds.parse::<i128>().ok()?;
@@ -157,7 +157,7 @@ impl Decimal {
         match self.0.checked_sub(i128::from(whole) * SECOND) {
             // Digits and a point.
             Some(difference) => Self(difference).to_string().parse().unwrap_or(f64::NAN),
-            // Seconds are exact in f64, and f64 has no fractions of numbers so large.
+            // Such a number is a whole number in f64, so its whole seconds are exact.
             None => {
                 let rest = self.0.rem_euclid(SECOND) as f64 / SECOND as f64;
                 (self.whole_seconds() - whole) as f64 + rest

@@ -210,7 +210,7 @@ codes! {
     BvhMotion = "E206", "no MOTION", "The file ends within its hierarchy; it is probably truncated.";
     BvhFrames = "E207", "not a number of frames", "The line after MOTION is `Frames: ` and a whole number.";
     BvhFrameTime = "E208", "not a frame time", "The line after Frames is `Frame Time: ` and the seconds of a frame, from 1e-9 to 1e9.";
-    BvhRow = "E209", "the wrong number of numbers", "Each frame is a line with one number for each channel, in the order of the hierarchy.";
+    BvhRow = "E209", "the wrong number of values", "Each frame is a line with one number for each channel, in the order of the hierarchy.";
     BvhCut = "E210", "fewer rows than frames", "The file ends before its last frame; it is probably truncated.";
     BvhSecond = "E211", "a second HIERARCHY", "A file has one hierarchy. If the file contains several, split it.";
     BvhWrite = "E212" elsewhere, "a clip that BVH cannot store", "A BVH file has one clip, with frames at a constant rate and Euler angles about three different axes.";
@@ -232,7 +232,7 @@ codes! {
     OneClip = "E315" elsewhere, "not one clip", "An NPZ file holds one clip.";
     Layout = "E316" elsewhere, "samples that do not fit the layout", "If the layout of a file is kept, the number of tracks must not change, and a file without a list of times needs frames at a constant rate.";
     NotPerFrame = "E317" elsewhere, "an array that cannot be interpolated", "`--linear NAME`, in Python `linear=[NAME]`, accepts names of numeric arrays that have an entry for each frame and are not keys.";
-    RateBesideTimes = "E318" elsewhere, "a rate beside times", "`--source-fps` and `--override-fps` are only for files without times. This file has the time of every key.";
+    RateBesideTimes = "E318" elsewhere, "a rate in addition to times", "`--source-fps` and `--override-fps` are only for files without times. This file has the time of every key.";
     BodyModel = "E319" elsewhere, "not a model of the body", "`--body-model` accepts a model of SMPL, SMPL-H or SMPL-X as NPZ or pickle, or a folder with one for each gender. It must belong to the kind of body in the motion.";
     BodyAlone = "E320" elsewhere, "the shape of a body without a motion", "In addition to motions, AMASS contains the shape of each subject, `shape.npz`, and the first stage of fitting markers, `*_stagei.npz`. These files contain no clips; leave them out. In Python, `MotionLibrary.load(…, on_error=\"skip\")` leaves them out and lists them.";
     // E4xx and W4xx: tables (Parquet, Arrow, CSV).
@@ -279,19 +279,19 @@ codes! {
     McapRoute = "E804" elsewhere, "a path without times", "All poses of a path have the same stamp, as a planner writes a route. A route has no times; `tumble follow` moves a body along one.";
     // E9xx and W9xx: robots.
     RobotXml = "E900" elsewhere, "an XML file that cannot be read", "A robot's file is well-formed XML in UTF-8 without a document type definition, at most 4 MiB with the files that it includes.";
-    RobotTree = "E901" elsewhere, "a robot that is no tree", "Its bodies are trees, each body and joint has its own name, and each element has the attributes that it needs; of the limits of a joint the smaller comes first.";
+    RobotTree = "E901" elsewhere, "a robot that is no tree", "Its bodies are trees, each body and joint has its own name, and each element has the attributes that it needs. Of the two limits of a joint, the smaller one comes first.";
     RobotInclude = "E902" elsewhere, "an include that is not followed", "An MJCF includes each file once, and only files in its folder and below.";
     RobotElement = "E903" elsewhere, "an element that is not read", "The element would create or move bodies by rules that are not supported; the message names an alternative.";
     JointsDoNotFit = "E904" elsewhere, "joints that are not the robot's", "The file names joints that the robot of `--robot` does not have, or has more or fewer joints without naming them. Robots of one name exist in versions with different joints.";
-    NoMassCentre = "E905" elsewhere, "a body without a centre of mass", "Velocities of centres of mass (`--velocity-at mass`, BeyondMimic, IsaacLab) need them, and the robot's file has no `inertial` for this body. MuJoCo derives it from shapes, which are not read. Add it, or ask for velocities of origins.";
+    NoMassCentre = "E905" elsewhere, "a body without a centre of mass", "Velocities of centres of mass (`--velocity-at mass`, BeyondMimic, IsaacLab) need the centre of mass of each body, and the robot's file has no `inertial` for this body. MuJoCo derives it from shapes, which Tumble does not read. Add it, or use velocities of origins.";
     OrderContradicts = "E907" elsewhere, "an order that the bodies contradict", "The poses of bodies in the file are compared with those that follow from its joints and the robot of `--robot`. They agree only in one order, and it is not the stated one. Programs list joints and bodies depth first (MuJoCo, mjlab) or breadth first (PhysX, IsaacLab), and quaternions as w x y z or x y z w.";
     TwoDialects = "E908", "arrays of two dialects", "Layouts of robots' motion are recognised by the names and the shapes of their arrays, and the file has those of two. Save one of them, or name the arrays with `--map`.";
     PickleDamaged = "E910", "a pickle that cannot be read", "It is truncated or damaged, or not a pickle. The location is a position in the file, or in what it unpacks to.";
     PickleCalls = "E911", "a pickle that would run code", "It names a function or a class that Python would call when it reads the file. Such files may do anything to the computer of those who open them with Python. Only numbers, texts, lists, dicts and arrays are read.";
     ObjectForValue = "E912", "an object where a value is needed", "The value is an object of a class that is not known here. Save it as numbers, text or an array.";
     PickleType = "E913", "an array of a type that is not read", "Arrays of numbers (floats, integers, truth values) and of texts are read. Records, dates and complex numbers are not; save each part as an array.";
-    PickleForm = "E914", "a form of pickle that is not read", "Its compression, its protocol or where its data lies is not supported. The message says how to save the file again.";
-    PickleLimits = "E915", "a pickle beyond the limits", "Its values are nested deeper than 1000, are more than 2^24, contain themselves, or take more memory than the file's budget when each reference to them counts.";
+    PickleForm = "E914", "a form of pickle that is not read", "Its compression, its protocol or the location of its data is not supported. The message says how to save the file again.";
+    PickleLimits = "E915", "a pickle beyond the limits", "Its values are nested more than 1000 deep, there are more than 2^24 of them, or a value contains itself. Or the values would need more memory than is allowed; a value counts once for each reference to it.";
     NotRecognised = "E917" elsewhere, "a skeleton that is not recognised", "Joints of two skeletons are paired by the parts of the body. The parts are found by the names and parents of joints, as in known kinds of skeletons; this skeleton is of another kind. Pair its joints with `--bones`.";
     Dialect = "E918" elsewhere, "a motion that a dialect cannot store", "The layout of the other program has a number for each hinge and slide, one root, and frames of one rate. The message names the part of the motion that it cannot store. `--fps` of `tumble eval` samples a motion at another rate; NPZ, CSV and GLB (without `--dialect`) store all of it.";
     OutsideLimits = "E919" elsewhere, "a joint outside its limits", "`--limits refuse` makes this an error. `--limits clamp` keeps joints inside, `--limits report` warns and keeps their values.";
@@ -304,7 +304,7 @@ codes! {
     Tiny = "W007", "a number too small for f32", "It becomes 0.";
     NormOff = "W008", "a quaternion far from unit length", "It is normalised.";
     Order = "W009", "components may be in the order x y z w", "Every fourth column is near 1 and the first near 0, as when small rotations are written with w last. This format has w first.";
-    Gap = "W010", "an unusual gap between times", "Under 1e-9 s or over 1e9 s: are the times seconds?";
+    Gap = "W010", "an unusual gap between times", "The gap is shorter than 1e-9 s or longer than 1e9 s. Perhaps the times are not in seconds.";
     OneKey = "W011", "only one key", "Nothing moves.";
     HalfTurn = "W012", "neighbouring keys 180° apart", "Both directions of rotation are equally long; the stored signs decide.";
     EqualKeys = "W013", "a key given twice", "Two keys at one time with equal values; the second is dropped.";
@@ -334,10 +334,10 @@ codes! {
     FrameTimeRounded = "W211", "a frame time of few digits", "A frame time such as 0.033 is probably that of a usual rate, 30 frames a second, rounded to few digits. With this rate the clip is longer or shorter by more than 0.5 %. `--raw-times` keeps the frame time as written, `--override-fps` replaces it.";
     OffsetsReplaced = "W212" elsewhere, "offsets in the file are replaced", "The file has offsets of its joints, and `--offsets` or `--body-model` gives others. Leave the option out to keep those of the file.";
     OtherSpace = "W213" elsewhere, "another unit or up axis than the format's", "glTF is in metres with y up. The input states another unit or up axis, and the clip was not converted. So it lies on its side, or is too large or too small. `--up-axis y --scale metres` converts it.";
-    NoPositions = "W214" elsewhere, "a trajectory without positions", "The clip has rotations alone, and a trajectory has a position with each: 0 0 0 is written, the same for all poses.";
+    NoPositions = "W214" elsewhere, "a trajectory without positions", "The clip has only rotations, but a trajectory has a position for each of them. 0 0 0 is written for all poses.";
     UnknownBody = "W301", "a body of an unknown number of joints", "SMPL has 24 joints, SMPL-H 52, SMPL-X 55; 22 are common to them. Bodies with another number are read without names and parents.";
     LeftOut = "W302" elsewhere, "arrays that are left out", "They have an entry for each frame of the input, and it is not known how to interpolate them: `--linear NAME`, in Python `linear=[NAME]`, interpolates them linearly.";
-    ObjectsBeside = "W303", "pickled Python objects beside the keys", "The keys are in other arrays, so that these are not read. If the file is written in the same layout, they are copied, unless they have an entry for each frame.";
+    ObjectsBeside = "W303", "pickled Python objects in addition to the keys", "The keys are in other arrays, so these objects are not read. If the file is written in the same layout, they are copied, unless they have an entry for each frame.";
     TwoRates = "W304", "two rates that differ", "The file states two different rates, or a rate that contradicts its times, its duration, or the rate of an option. `--override-fps` replaces the rate of a file, or a number that is no rate; `--source-fps` is for files that state none.";
     TimeUnit = "W305", "times in another unit than seconds", "Seconds since 1970 have ten digits, milliseconds thirteen, microseconds sixteen, nanoseconds nineteen (ORB-SLAM writes them). A first time from 1e11 on is taken for milliseconds, from 1e14 on for microseconds, from 1e17 on for nanoseconds. `--time-unit` states the unit and avoids this warning.";
     ArraysNotRead = "W306", "arrays that are not read", "This is not an error: the rotations were found in other arrays, and the names of these arrays are not known. Usually there is nothing to do. If one of them contains translations or times, name all arrays of the motion, as in `--map rotations=quat:frame,translations=root_pos:frame,time=t`. Arrays that files of a layout usually contain, such as `betas` and `gender` of AMASS, cause no warning. A result in the same layout keeps constant arrays.";
@@ -348,7 +348,7 @@ codes! {
     FbxBeside = "W701", "content that is not motion", "Only nodes and their animation are read from FBX. Meshes, skins, materials and other content are not.";
     FbxProperties = "W702", "curves of other properties", "They animate something other than a transform, such as blend shapes, visibility or a lens.";
     FbxOutside = "W703", "keys outside the take", "An animation stack has a start and an end. Some curves have keys outside, which a player does not show.";
-    FbxScaleNodes = "W704", "nodes that carry scales", "In FBX, a node's scale may be not inherited by its children. If this matters, an additional node carries the scale.";
+    FbxScaleNodes = "W704", "nodes that carry scales", "In FBX, children may not inherit the scale of a node. If this changes the result, an additional node has the scale.";
     FbxWild = "W705", "a curve that is not followed", "Between two keys it changes so fast that even a thousand times as many keys do not approximate it within the tolerance.";
     FbxRests = "W706", "a stack that moves nothing", "It has no curves of nodes, or is a pose: each curve has one key. Nothing moves.";
     FbxOdd = "W707", "a problem that was corrected", "The library that reads FBX found a problem and corrected it.";
@@ -356,10 +356,10 @@ codes! {
     FbxSolo = "W709", "a layer that plays alone", "In the program that wrote the file, this layer was set to play alone (Solo), for example to look at it. Layers that are muted are left out, all others are read. Mute the others to read this layer alone.";
     McapCut = "W801", "a truncated log", "It ends within a record or without the record that ends a log, for example because recording was interrupted. Everything before is read.";
     McapOthers = "W802", "topics of other types", "They contain no poses, or their messages are not encoded in CDR.";
-    McapClocks = "W803" elsewhere, "topics of different clocks", "The stamps of some topics are near the times at which the messages were logged, and those of others are not, for example because they are of a simulation or of a computer whose clock was not set. Their poses at equal times do not belong together.";
+    McapClocks = "W803" elsewhere, "topics of different clocks", "The stamps of some topics are near the times at which the messages were logged, and those of others are not. The others may be those of a simulation, or of a computer whose clock was not set. Poses of both kinds do not belong together at equal times.";
     AssumedRate = "W903", "a rate that is assumed", "The file has neither times nor a rate, and all files of its kind have the same rate. `--source-fps` sets another rate.";
-    JointLimits = "W904" elsewhere, "joints outside their limits", "The robot's file has limits of the joint, and the motion leaves them. No value is changed; `--limits clamp` keeps joints inside, `--limits refuse` makes this an error.";
-    RobotMerged = "W905" elsewhere, "bodies that others merge", "If `fusestatic` is set, MuJoCo merges bodies without joints into their parents. Then the numbers of bodies differ; the names are the same.";
+    JointLimits = "W904" elsewhere, "joints outside their limits", "The robot's file has limits of the joint, and the motion exceeds them. No value is changed; `--limits clamp` keeps joints inside, `--limits refuse` makes this an error.";
+    RobotMerged = "W905" elsewhere, "bodies that MuJoCo merges", "If `fusestatic` is set, MuJoCo merges bodies without joints into their parents. Then the numbers of bodies differ; the names are the same.";
     UnnamedJoints = "W906", "joints without names", "The file has a number for each joint and does not name them. They are numbered in the order of the file, which depends on the program that wrote it. `--robot FILE`, in Python `robot=`, gives them the names of the joints in a robot's file.";
     QuaternionOrder = "W907", "a quaternion whose order is doubtful", "The first component is large and the last small, as for a robot that stands upright if w is first. The columns have no names; state the order with `--source-order`.";
     TranslationsDropped = "W910" elsewhere, "translations of joints that are lost", "On the target skeleton, only the hips have translations. Other joints of the source also move relative to their parents; the message has the largest distance.";
@@ -368,8 +368,8 @@ codes! {
     RestingJoints = "W913" elsewhere, "joints without keys", "The robot of `--robot` has joints for which the file has no values. They stay where the robot's file has them.";
     OtherRobot = "W914" elsewhere, "bodies that are not where their joints put them", "The poses of bodies in the file differ from those that follow from its joints and the robot of `--robot`. The file may belong to another version of the robot. Bodies are computed from the joints.";
     AngleJumps = "W915" elsewhere, "angles that jump by more than half a turn", "Between two keys an angle changes by more than half a turn. The program that wrote the file may have wrapped angles to one turn. The angle is interpolated as stored, the long way around. `--robot` unwraps hinges without limits; otherwise unwrap the angles first (numpy.unwrap).";
-    FollowingJoints = "W916" elsewhere, "joints that follow others", "The robot's file says that the joint follows another (`mimic`): its value is that of the other joint times a factor plus an offset. It is computed, and the file's values of it are not used; the message says how far they are from the computed ones.";
-    RotationsDropped = "W917" elsewhere, "rotations of joints that are lost", "Joints of the input move, and no joint of the target follows them: `tumble retarget` pairs the parts of the body, and other joints that have the same name and the same joints above them. `--bones` pairs further joints by name.";
+    FollowingJoints = "W916" elsewhere, "joints that follow others", "In the robot's file, the joint follows another joint (`mimic`): its value is that of the other joint times a factor, plus an offset. This value is computed and used instead of the values in the file; the message has the largest difference between both.";
+    RotationsDropped = "W917" elsewhere, "rotations of joints that are lost", "Joints of the input move, but no joint of the target follows them. `tumble retarget` pairs the parts of the body, and other joints with the same name and the same joints above them. `--bones` pairs further joints by name.";
 }
 
 impl Code {

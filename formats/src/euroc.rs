@@ -77,7 +77,7 @@ const HEADING: &str = "#timestamp [ns],p_RS_R_x [m],p_RS_R_y [m],p_RS_R_z [m],\
                        q_RS_w [],q_RS_x [],q_RS_y [],q_RS_z []\n";
 
 fn open_euroc(path: &Path, options: &ReadOptions) -> Result<Loaded, Diagnostic> {
-    // With `--map`, which says what the columns are, the file is read as a table.
+    // With `--map`, the user defines the columns, so the file is read as a table.
     if options.map.is_some() {
         return open_csv(path, options);
     }

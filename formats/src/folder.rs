@@ -135,11 +135,11 @@ impl Folder {
     #[cfg(target_os = "linux")]
     pub(crate) fn create_unnamed(&self) -> Option<File> {
         use rustix::fs::{Mode, OFlags, openat};
-        // As `File::create` does: readable by all, less the umask.
+        // The same permissions as `File::create`: readable by all, except for the umask.
         let flags = OFlags::TMPFILE | OFlags::RDWR | OFlags::CLOEXEC;
         let file = openat(&*self.handle, ".", flags, Mode::from_raw_mode(0o666)).ok()?;
         let file = File::from(file);
-        // It is named by this path.
+        // The file has no name yet, so it is accessed by the path of its descriptor.
         fs::symlink_metadata(descriptor(&file))
             .is_ok()
             .then_some(file)
@@ -210,7 +210,7 @@ mod system {
 
     pub(super) fn create_new(folder: &Folder, name: &OsStr) -> io::Result<File> {
         let flags = OFlags::CREATE | OFlags::EXCL | OFlags::RDWR | OFlags::CLOEXEC;
-        // As `File::create` does: readable by all, less the umask.
+        // The same permissions as `File::create`: readable by all, except for the umask.
         let mode = Mode::from_raw_mode(0o666);
         Ok(openat(&*folder.handle, name, flags, mode)?.into())
     }
@@ -240,7 +240,7 @@ mod system {
             use rustix::io::Errno;
             let handle = &*folder.handle;
             match renameat_with(handle, from, handle, to, RenameFlags::NOREPLACE) {
-                // The file system cannot do that, or the system does not know the call.
+                // The file system does not support this, or the system does not have the call.
                 Err(Errno::INVAL | Errno::NOSYS | Errno::PERM | Errno::NOTSUP) => {}
                 renamed => return Ok(renamed?),
             }
@@ -321,7 +321,7 @@ mod system {
         match fs::hard_link(&from, &to) {
             Ok(()) => fs::remove_file(from),
             Err(error) if error.kind() == io::ErrorKind::AlreadyExists => Err(error),
-            // A file system without links.
+            // The file system does not support links.
             Err(_) if fs::symlink_metadata(&to).is_ok() => {
                 Err(io::Error::from(io::ErrorKind::AlreadyExists))
             }
@@ -344,7 +344,7 @@ mod tests {
         names
     }
 
-    /// Catches whatever opens the directory by its path again.
+    /// Finds code that opens the directory a second time, by its path.
     #[cfg(unix)]
     #[test]
     fn files_stay_in_the_directory_that_was_opened() {

@@ -54,7 +54,8 @@ const ALL: [Foreign; 26] = [
     Foreign {
         extensions: &["xml", "urdf", "mjcf", "xacro", "dae"],
         begins: &[b"<?xml", b"<mujoco", b"<robot", b"<COLLADA"],
-        description: "XML, which has no motion that is read; of a robot (MJCF, URDF) `tumble info` lists bodies and joints, and its motion is in another file",
+        description: "XML, which contains no motion; for robots (MJCF, URDF), `tumble info` lists bodies and joints, \
+                      and the motion is in another file",
     },
     Foreign {
         extensions: &[],

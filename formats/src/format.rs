@@ -393,8 +393,8 @@ pub trait Document: fmt::Debug + Send + Sync {
         out: &mut dyn Write,
     ) -> Result<Vec<Diagnostic>, WriteError>;
 
-    /// Writes the file with the keys of these clips instead of all of its animations. Their tracks move what the file calls
-    /// by the tracks' names. Returns warnings.
+    /// Writes the file with the keys of these clips instead of all of its animations. A track moves the node of the same
+    /// name. Returns warnings.
     ///
     /// # Errors
     /// As [`Document::write`]; [`io::ErrorKind::Unsupported`] if the format has one clip, whose keys `write` replaces.

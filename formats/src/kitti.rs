@@ -203,7 +203,7 @@ fn read_rows<R: BufRead>(
     let mut rows = [[0.0; 4]; 3];
     let mut after = Vec::new();
     for (index, (column, token)) in tokens(line).enumerate() {
-        // The other numbers may be anything, unless they may be a fourth row.
+        // Further numbers are allowed to be anything. They are parsed because they may be a fourth row.
         let read = match number::parse(token) {
             Ok(read) => read.value,
             Err(_) if index >= NUMBERS => f64::NAN,
@@ -252,12 +252,14 @@ fn write_motion(
         let are_frames =
             |&rate: &FrameRate| times.iter().enumerate().all(|frame| is_frame(rate, frame));
         let Some(rate) = path.sampled.rate.filter(are_frames) else {
-            let message = "its times are not frames of a rate, and KITTI has no times; give --times-out, a file of them";
+            let message = "its times are not frames of one rate, and KITTI stores no times; write them to a separate \
+                           file with --times-out";
             return Err(path.refuse(message.to_owned()));
         };
         let first = path.sampled.time_digits(0).unwrap_or_default();
         let message = format!(
-            "KITTI has no times; left out: poses come at {rate} a second, from {first} s on (--times-out writes them)"
+            "KITTI stores no times; left out: the poses are at {rate} fps, from {first} s on (--times-out writes the \
+             times)"
         );
         warnings.push(Diagnostic::new(&options.name, Code::NoRoom, message));
     }
@@ -343,7 +345,8 @@ mod tests {
             ),
             Code::KittiPose
         );
-        // A frame's number before the matrix, as KITTI-360 has it: the numbers read as a matrix are no rotation.
+        // A frame number before the matrix, as in KITTI-360. If it is read as part of the matrix, this is not a
+        // rotation.
         assert_eq!(
             refused("7 1 0 0 1.5 0 1 0 -2 0 0 1 3\n", &options),
             Code::NoRotation
@@ -435,7 +438,7 @@ mod tests {
         let again = &read(matrices, seconds).unwrap().clips[0];
         assert_eq!(again.set.track(0).times, clip.set.track(0).times);
         assert_eq!(again.set.track(0).keys, clip.set.track(0).keys);
-        // Without a file of times such poses cannot be read.
+        // Without a file of times, poses at uneven times cannot be read again.
         let refused = write(clip, &MotionOptions::default());
         assert!(matches!(refused, Err(WriteError::Refused(fault)) if fault.code == Code::TumWrite));
         let code = |poses: &str, times: &str| read(poses, times).unwrap_err().code;

@@ -168,7 +168,7 @@ impl FromStr for Entry {
         };
         let mut degrees = false;
         let mut words = words.split(':');
-        // The text before the first colon belongs to the bracket.
+        // Text between the bracket and the first colon is a mistake.
         let glued = words.next().filter(|glued| !glued.is_empty());
         let unknown = |word: &str| MapError::Word {
             entry: entry(),

@@ -123,7 +123,7 @@ impl OutputLocation {
         match self.folder.parent_of(&self.name) {
             Ok(parent) if parent.is_in_place() => Ok(parent),
             Ok(parent) => Err(moved(parent.path())),
-            // The directory existed when the output was planned.
+            // The directory existed when the output was planned, but it does not any more.
             Err(error)
                 if is_refused(&error)
                     || matches!(
@@ -190,7 +190,7 @@ impl TemporaryName {
                 number /= LETTERS.len() as u64;
             }
             let name = OsString::from(format!("{PREFIX}{mark}{random}{SUFFIX}"));
-            // A process that is about to end waits until the new file is listed.
+            // A process that is about to end must wait until the new file is in the list, so that it is removed.
             let mut unfinished = unfinished();
             match create(&name) {
                 Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
@@ -298,7 +298,8 @@ fn temporary_files(directory: &Path) -> Vec<(OsString, String)> {
         let name = entry.file_name();
         let stem = name.to_str()?.strip_prefix(PREFIX)?.strip_suffix(SUFFIX)?;
         let (mark, random) = stem.split_at(stem.rfind('-').map_or(0, |at| at + 1));
-        // Python's temporary files have eight, underscores among them.
+        // The random part of our names has this length; Python's temporary files have eight characters, which may be
+        // underscores.
         let is_random = random.len() == RANDOM || !mark.is_empty() && random.len() == 8;
         let is_temporary = is_random
             && random
@@ -473,7 +474,7 @@ impl Temporary {
             #[cfg(target_os = "linux")]
             Self::Unnamed { file, mark } => {
                 match name_unnamed(&file, parent, &mark, to, overwrite) {
-                    // Sandboxes and Android forbid links, and without one the file gets no name.
+                    // Sandboxes and Android forbid links, so the nameless file cannot get a name.
                     Err(error)
                         if matches!(
                             error.kind(),
@@ -508,7 +509,7 @@ fn name_unnamed(
     if !overwrite {
         return parent.name_new(file, to);
     }
-    // Only a file that has a name can replace another one.
+    // Only a file with a name can replace another file.
     let create = |name: &OsStr| parent.name_new(file, name);
     let (name, ()) = TemporaryName::new(parent, mark, create)?;
     name.rename(to, overwrite)
@@ -538,7 +539,7 @@ impl Write for Temporary {
 fn named_in(parent: &Folder, mark: &str) -> io::Result<Temporary> {
     loop {
         let (name, file) = TemporaryName::new(parent, mark, |name| parent.create_new(name))?;
-        // Another process that looks for abandoned files may have met it before it was locked.
+        // Another process that removes abandoned files may have found it before it was locked.
         let is_locked = matches!(file.try_lock(), Err(fs::TryLockError::WouldBlock));
         if !is_locked && is_there(&file) {
             return Ok(Temporary::Named { file, name });
@@ -601,13 +602,13 @@ pub fn check_target(path: &Path, overwrite: bool, inputs: &[PathBuf]) -> Result<
             path: path.to_owned(),
         });
     }
-    // A rename would replace it by a file.
+    // A rename would replace a pipe or a device by a file, so it is opened and written directly.
     if fs::metadata(path).is_ok_and(|metadata| !metadata.is_file()) {
         return Err(OutputError::NotAFile {
             path: path.to_owned(),
         });
     }
-    // Also through links: both names lead to one file.
+    // Links are resolved, because two names may lead to one file.
     if let Ok(target) = fs::canonicalize(path) {
         let same = |input: &&PathBuf| fs::canonicalize(input).is_ok_and(|input| input == target);
         if let Some(input) = inputs.iter().find(same) {
@@ -621,7 +622,7 @@ pub fn check_target(path: &Path, overwrite: bool, inputs: &[PathBuf]) -> Result<
         Ok(_) if !overwrite => Err(OutputError::Exists {
             path: path.to_owned(),
         }),
-        // Its name is too long, or has characters that no name may have.
+        // The name is too long, or contains characters that the system forbids in names.
         Err(source) if source.kind() == io::ErrorKind::InvalidFilename => Err(OutputError::Write {
             path: path.to_owned(),
             source,
@@ -719,7 +720,7 @@ mod tests {
         let (writing, ended) = channel::<()>();
         std::thread::scope(|scope| {
             scope.spawn(move || {
-                // Where the writer fails, its end of the channel is dropped too.
+                // If the writer fails, its end of the channel is dropped, too.
                 while ended.try_recv() != Err(TryRecvError::Disconnected) {
                     remove_abandoned(path);
                 }
@@ -757,7 +758,7 @@ mod tests {
         assert_eq!(names(directory.path()), ["out"]);
     }
 
-    /// Whatever ends the writer of a file without a name leaves nothing.
+    /// A file without a name disappears, however the process ends that writes it.
     #[cfg(target_os = "linux")]
     #[test]
     fn a_file_without_a_name_gets_one_at_the_end() {

@@ -23,7 +23,7 @@ pub struct PathFormat {
     pub name: &'static str,
     /// A short description of the contents that are read.
     pub summary: &'static str,
-    /// Whether a file that begins with these bytes is in this format, with whatever contents.
+    /// Whether a file that begins with these bytes is in this format; it need not contain paths.
     pub probe: fn(&[u8]) -> bool,
     /// Whether a file of this format that begins with these bytes contains paths.
     pub is_of_paths: fn(&[u8]) -> bool,

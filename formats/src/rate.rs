@@ -1,7 +1,7 @@
 //! Finds the rate of a file's keys from its times as they are written: [`of`]. Times are seldom whole frames: they
-//! were rounded to f32 or to some decimals, or are multiples of a rounded period, or were added up in f32. The largest
-//! error of each rounding is known, and a sum has bits that can be computed again. Therefore all rates are tested, and a list of common rates only decides between several that a few
-//! digits leave open.
+//! were rounded to f32 or to some decimals, are multiples of a rounded period, or were added up in f32. The largest
+//! error of each rounding is known, and a sum can be computed again, bit for bit. Therefore all rates are tested. A list
+//! of usual rates only decides if times with few digits agree with several.
 //!
 //! The table in `docs/formats.md` is the test of this module.
 
@@ -360,7 +360,7 @@ fn of_times(lists: &[Vec<f64>], precision: Precision) -> Option<FrameGrid> {
     let Precision::Decimals(_) = precision else {
         return found;
     };
-    // Many digits may be those of an f32.
+    // A number with many digits may have been an f32.
     let half = 0.5 * precision.ulp(1.0);
     let are_f32 = || {
         let digits = |time: &f64| (f64::from(*time as f32) - time).abs() <= half;
@@ -374,12 +374,12 @@ fn of_distinct(times: &[f64], precision: Precision) -> Option<FrameGrid> {
     let steps = || times.windows(2).map(|pair| pair[1] - pair[0]);
     let step = steps().fold(f64::INFINITY, f64::min);
     let (first, last) = (times[0], times[times.len() - 1]);
-    // The written rate may be the intended one.
+    // The rate as written may be the intended one.
     let exact = Precision::F64.rounding(first.abs().max(last.abs()));
-    // Times may have been added up, key by key.
+    // A program may have computed each time by adding the period to the time before.
     let added = |keys: usize| exact * (2.0 + keys as f64 / 8.0);
     let count = ((last - first) / step).round();
-    // A step between two late times is off by more than the mean of all.
+    // The difference of two late times has a larger error than the mean of all.
     let mean = (last - first) / count;
     let even = |(key, &time): (usize, &f64)| {
         let count = ((time - first) / mean).round();
@@ -417,7 +417,7 @@ fn of_distinct(times: &[f64], precision: Precision) -> Option<FrameGrid> {
         let is_at_zero = on_frames(times.iter().copied(), grid, 0.0, precision);
         Some(found(grid, if is_at_zero { 0.0 } else { first }))
     };
-    // The first time may be rounded too: other times decide where in its window its frame is.
+    // The first time may be rounded too. The other times determine where its frame is, within the rounding.
     let on_first = |steps: &StepRates, grid| {
         let frame = steps.first_frame(&windows, grid)?;
         Some(found(grid, first.clamp(frame.from, frame.to)))
@@ -594,7 +594,7 @@ impl StepRates {
 
 /// The fraction with the smallest numbers from `low` to `high`.
 fn simplest(low: f64, high: f64) -> Option<(u64, u64)> {
-    // By the tree of Stern and Brocot, a run at a time.
+    // Searches the Stern-Brocot tree; each step of the loop takes a run of equal steps.
     let (mut low, mut high) = (low, high);
     let (mut before, mut last) = ((0u128, 1u128), (1u128, 0u128));
     for _ in 0..64 {
@@ -651,7 +651,7 @@ fn on_one_of(
     let tried = rates.clone().count() as f64;
     let widths = windows.iter().map(|window| window.to - window.from);
     let widest = widths.fold(0.0, f64::max);
-    // Whole seconds are frames of every whole rate, and 0 is one of all: they show nothing.
+    // Whole seconds are frames of every whole rate, and 0 is a frame of every rate, so they give no information.
     let is_whole_second = |window: &TimeWindow| window.from.ceil() <= window.to;
     let at_zero = |window: &TimeWindow| window.from <= 0.0 && 0.0 <= window.to;
     let count = |shows_nothing: &dyn Fn(&TimeWindow) -> bool| {

@@ -344,7 +344,7 @@ pub fn retarget(
         if let Some((joint, partner)) = pairs.hips {
             let moved = now.positions[partner] - from.rest.positions[partner];
             let position = to.rest.positions[joint] + scale * (axes * moved);
-            // The joints above the hips rest.
+            // The joints above the hips stay in their rest poses.
             hips.push(match to.parents[joint] {
                 None => position,
                 Some(parent) => {

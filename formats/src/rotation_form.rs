@@ -120,8 +120,8 @@ mod tests {
             let found = form.rotation(numbers).unwrap();
             assert!(found.dot(quarter).abs() > 1.0 - 1e-15, "{form:?}: {found}");
         }
-        // The second turn is about an axis that the first one has turned, or about that of the world:
-        // SciPy's from_euler("XYZ", [90, 90, 0]) and ("xyz", [90, 90, 0]).
+        // Intrinsic: the second rotation is about the rotated axis. Extrinsic: about the axis of the world. The values
+        // are those of SciPy's from_euler("XYZ", [90, 90, 0]) and ("xyz", [90, 90, 0]).
         let intrinsic = euler("XYZ", true).rotation(&[90.0, 90.0, 0.0]).unwrap();
         assert!(intrinsic.dot(DQuat::from_xyzw(0.5, 0.5, 0.5, 0.5)).abs() > 1.0 - 1e-15);
         let extrinsic = euler("xyz", true).rotation(&[90.0, 90.0, 0.0]).unwrap();

@@ -23,7 +23,7 @@ pub(crate) fn of_matrix(rows: [[f64; 3]; 3]) -> Option<DQuat> {
     if !is_rotation {
         return None;
     }
-    // Four times the square of each component; the largest is divided by, and never small.
+    // Four times the square of each component. The largest one is the divisor, because it is never small.
     let squares = [
         1.0 + a[0] - b[1] - c[2],
         1.0 - a[0] + b[1] - c[2],

@@ -121,7 +121,8 @@ impl Source {
         let mut bytes = Vec::new();
         let reserved = bytes.try_reserve_exact(known as usize);
         let read = reserved.map_err(io::Error::from).and_then(|()| {
-            // First the bytes in the buffer, then the others without it, which would copy them once more.
+            // First the bytes in the buffer. The other bytes are read without the buffer, which would copy them once
+            // more.
             bytes.extend_from_slice(self.reader.buffer());
             let rest = (limit + 1).saturating_sub(bytes.len() as u64);
             self.reader.get_mut().take(rest).read_to_end(&mut bytes)
@@ -149,7 +150,8 @@ impl Source {
         if same {
             return Ok(());
         }
-        let message = "changed while it was read; read it again when its writer is done";
+        let message =
+            "changed while it was read; try again when the other program has finished writing it";
         Err(Diagnostic::new(&self.name, Code::Changed, message))
     }
 }

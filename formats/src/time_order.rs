@@ -61,7 +61,7 @@ fn are_mixed<T: PartialOrd + Copy>(before: &[T], after: &[T]) -> bool {
     if late.len().min(early.len()) < LEAST_MIXED {
         return false;
     }
-    // A block of rows that comes late as a whole lies in one gap of the others.
+    // If a block of rows is late as a whole, it fits into one gap between the others.
     let gap = |time: &T| late.partition_point(|other| other < time);
     early.first().map(gap) != early.last().map(gap)
 }
@@ -79,15 +79,15 @@ mod tests {
             (&[1, 1, 2], TimeOrder::Sorted),
             (&[1, 0], unsorted(1)),
             (&[5, 4, 3, 2, 1, 0], unsorted(1)),
-            // One row is late, then two one after the other, then a block.
+            // One late row, then two late rows in sequence, then a late block.
             (&[0, 1, 3, 2, 4, 5], unsorted(3)),
             (&[0, 1, 2, 5, 6, 3, 4, 7, 8], unsorted(5)),
             (&[0, 1, 2, 6, 7, 8, 3, 4, 5, 9], unsorted(6)),
-            // Two files in the other order.
+            // Two files in the wrong order.
             (&[10, 11, 12, 13, 0, 1, 2, 3], unsorted(4)),
             // Rows in a random order.
             (&[3, 9, 1, 4, 0, 8, 2, 7, 5, 6], unsorted(2)),
-            // From the start, from the middle, and with equal times.
+            // A clock that was set back: from the start, from the middle, and with equal times.
             (&[0, 2, 4, 6, 1, 3, 5, 7], reset(4)),
             (&[0, 10, 20, 30, 40, 25, 35, 45], reset(5)),
             (&[0, 1, 2, 3, 0, 1, 2, 3], reset(4)),

@@ -145,7 +145,7 @@ fn what_bvh_cannot_hold_is_refused() {
     assert!(refusal(&[bad], &options).contains("constant rate"));
     let mut bad = good.clone();
     bad.times = &[0.0, 0.1];
-    assert!(refusal(&[bad], &options).contains("0.1 s is not on the next frame"));
+    assert!(refusal(&[bad], &options).contains("0.1 s is not at the next frame"));
     let mut bad = good.clone();
     bad.translations = &[Vec3::ZERO, Vec3::NAN];
     assert!(refusal(&[bad], &options).contains("not finite"));

@@ -153,7 +153,7 @@ fn picture() -> String {
         let y = |value: f64| top + 55.0 - 55.0 * value;
         let said = match end_frame {
             EndFrame::Key => "key: a sample at the end (formats with times)",
-            EndFrame::Hold => "hold: one frame more, with the value of the end (formats of frames)",
+            EndFrame::Hold => "hold: one more frame, with the value of the end (formats of frames)",
             EndFrame::LeaveOut => "leave-out: the last frame before the end; a loop jumps from it",
         };
         let mut lines = format!(

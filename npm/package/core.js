@@ -54,7 +54,7 @@ class Module {
       return run();
     } catch (error) {
       if (error instanceof TumbleError) throw error;
-      // An instance that stopped in the middle of a call is in no state to be called again.
+      // A module that stopped in the middle of a call may be in an inconsistent state, so it is not called again.
       this.broken = `the engine stopped: ${error.message}; it may have run out of memory`;
       throw new TumbleError(this.broken);
     }
@@ -81,7 +81,7 @@ function numbers(value, kind, components, what) {
   if (!isNumbers(value)) throw new TumbleError(`${what} are no array of numbers, but ${typeof value}`);
   const flat = Array.isArray(value) ? value.flat(2) : value;
   for (let i = 0; i < flat.length; i++) {
-    // A hole or a text would become NaN or a number in silence.
+    // A missing element or a text would silently become NaN or a number.
     if (typeof flat[i] !== "number") throw new TumbleError(`${what}: number ${i} is ${String(flat[i])}, no number`);
   }
   const array = kind.from(flat);
@@ -182,7 +182,7 @@ function headerOf(quantity, options, known) {
   const header = { quantity };
   for (const [name, value] of Object.entries(options)) {
     if (!known.includes(name)) throw new TumbleError(`there is no option \`${name}\`; there are ${known.join(", ")}`);
-    // Digits are kept as text: JSON's readers may round a number in its last place.
+    // Numbers are passed as text, because JSON parsers may round the last digit.
     if (value !== undefined) header[name] = typeof value === "number" ? String(value) : value;
   }
   return header;
@@ -327,7 +327,7 @@ function release(handle) {
   if (!handle.module.broken) handle.module.call(handle.call, handle.header);
 }
 
-// Clips and samplers that nobody has any more give their memory back when the garbage is collected.
+// Clips and samplers that are not referenced any more release their memory when the garbage is collected.
 const forgotten = globalThis.FinalizationRegistry && new FinalizationRegistry(release);
 
 /** The engine in this page, worker or process. */

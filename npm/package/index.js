@@ -1,4 +1,4 @@
-// In browsers, and wherever `fetch` finds what lies beside a script.
+// For browsers, and for every environment in which `fetch` can load a file next to a script.
 
 import { TumbleError, loadFrom } from "./core.js";
 

@@ -77,7 +77,7 @@ test("samplers give the bits of samples, and fill what they are given", () => {
       const at = 4 * track;
       const expected = found.rotations.subarray(4 * i * sampler.tracks + at, 4 * i * sampler.tracks + at + 4);
       const rotation = out.subarray(at, at + 4);
-      // Signs continue along the samples of a track.
+      // The sign of each sample continues from the sample before.
       const sign = expected.some((number, c) => number * rotation[c] < 0) ? -1 : 1;
       assert.deepEqual([...rotation], [...expected].map((number) => number * sign || 0));
       assert.deepEqual(sampler.sample(track, time), rotation.slice());

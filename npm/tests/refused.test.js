@@ -78,7 +78,7 @@ test("no bytes stop the engine", () => {
     const whole = readFileSync(join(root, file));
     for (let round = 0; round < 300; round++) {
       const bytes = Uint8Array.from(whole.subarray(0, random(4) === 0 ? random(whole.length) : whole.length));
-      // Digits for digits leave many files whole.
+      // Many files stay valid if only digits are replaced by digits.
       for (let change = random(6); change > 0 && bytes.length > 0; change--) {
         const at = random(bytes.length);
         bytes[at] = bytes[at] >= 48 && bytes[at] < 58 ? 48 + random(10) : random(256);

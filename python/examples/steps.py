@@ -56,7 +56,7 @@ def run(library: tumble.MotionLibrary, steps: int, environments: int = ENVIRONME
     for _ in range(steps):
         times += STEP
         over = times > library.lengths[ids]
-        # An episode that is over begins again in another clip.
+        # When an episode ends, the environment continues in another clip.
         ids[over] = rng.integers(0, len(library), int(over.sum()))
         times[over] = 0.0
         started = time.perf_counter()

@@ -160,7 +160,7 @@ def others(library: tumble.MotionLibrary, ids: Any, times: Any) -> dict[str, flo
     rows, steps = torch.from_numpy(first), torch.from_numpy(t)
 
     def by_roma() -> Any:
-        # Each environment has a step of its clip; roma's slerp would take every step for every environment.
+        # Each environment needs one step of its clip. roma's slerp would compute every step for every environment.
         a, b = turned[0][rows], turned[0][rows + 1]
         arc = roma.unitquat_to_rotvec(roma.quat_product(roma.quat_conjugation(a), b))
         return roma.quat_product(a, roma.rotvec_to_unitquat(steps[:, None, None] * arc))

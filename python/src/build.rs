@@ -197,7 +197,7 @@ fn tracks_of(
     times: &Times,
     layout: KeysLayout,
 ) -> PyResult<(Tracks, bool)> {
-    // A list is one of tracks, unless it is said to be one of frames.
+    // A list is divided by tracks, unless the layout was stated to be by frames.
     if layout.said() != Some(Layout::FrameMajor)
         && let Some(parts) = parts(value)?
         && let first = quaternions(&parts[0], order, "keys[0]")

@@ -142,10 +142,10 @@ fn selected(clip: &Motion, joints: &[JointName]) -> Result<Motion, String> {
     let tracks: Vec<usize> = joints.iter().map(find).collect::<Result<_, _>>()?;
     let parent = |track: usize| clip.skeleton.get(track).and_then(|joint| joint.parent);
     for &track in &tracks {
-        // Where it hangs would be lost.
+        // The position relative to the parent would be lost.
         if let Some(parent) = parent(track).filter(|parent| !tracks.contains(parent)) {
             return Err(format!(
-                "tracks: `{}` hangs on `{}`, which is left out; name that joint, too",
+                "tracks: `{}` is a child of `{}`, which is left out; name that joint, too",
                 names[track], names[parent]
             ));
         }

@@ -501,7 +501,7 @@ fn of_clips(
             (pair.frames(&common, rate, start, end)).map_err(of_compare)?
         }
         Some(SampleChoice::Shared { times, .. }) => {
-            // The times are known, whatever the clips have.
+            // The times are given, so a warning about the rates of the clips does not apply.
             warning = None;
             pair.at(&common, &times).map_err(of_compare)?
         }

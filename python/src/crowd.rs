@@ -233,7 +233,7 @@ impl Crowd {
         let times = numbers(time, "time", 0.0)?;
         let speeds = numbers(speed, "speed", 1.0)?;
         let weights = numbers(weight, "weight", 1.0)?;
-        // Crowds do not extrapolate.
+        // Crowds cannot extrapolate, so this mode is not offered.
         let modes = WrapMode::ALL.map(|mode| (mode.name(), mode));
         let modes: Vec<_> = (modes.into_iter())
             .filter(|(_, mode)| *mode != WrapMode::Extrapolate)

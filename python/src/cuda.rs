@@ -345,7 +345,7 @@ impl Mapping {
             is_known: AtomicBool::new(false),
             process: std::process::id(),
         };
-        // Whatever was made until one step fails is given back as it is dropped.
+        // If one step fails, everything that the steps before created is released when it is dropped.
         in_context(cuda, context, || mapping.import())?;
         Ok(mapping)
     }
@@ -386,7 +386,7 @@ impl Mapping {
         let code = unsafe { (functions.map)(&raw mut address, memory, &raw const range) };
         cuda.checked("cuExternalMemoryGetMappedBuffer", code)?;
         self.address = Some(address);
-        // Without the semaphore the host waits, and the result is the same.
+        // If the semaphore cannot be imported, the host waits instead, with the same result.
         self.semaphore = self.import_semaphore().unwrap_or_default();
         if self.semaphore.is_none() {
             self.result.wait()?;
@@ -533,11 +533,11 @@ impl Drop for Mapping {
         if self.check_process().is_err() {
             return; // the driver is not there
         }
-        // Streams wait for a lost device's writing, and would be waited for for ever: then everything is leaked.
+        // After a lost device, streams would wait forever for its semaphore. So nothing is freed then.
         if self.result.wait().is_err() {
             return;
         }
-        // After an error of the driver's nothing more of it can be given back.
+        // If the driver reports an error, the remaining objects cannot be released.
         let _ = in_context(self.cuda, self.context, || self.give_back());
     }
 }

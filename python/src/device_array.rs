@@ -60,8 +60,8 @@ impl DeviceArray {
             Some(-1) => return Ok(()), // the consumer orders its work itself
             Some(0) => {
                 return Err(PyBufferError::new_err(
-                    "stream: 0 may be either default stream of CUDA's; give 1, that of all threads, or 2, that of \
-                     each thread",
+                    "stream: 0 is ambiguous; give 1 (the default stream of all threads) or 2 (the default stream of \
+                     each thread)",
                 ));
             }
             Some(stream) => usize::try_from(stream).map_err(|_| {
@@ -119,14 +119,13 @@ impl DeviceArray {
             Some(there) if there == (CUDA, ordinal) => {}
             Some(there) => {
                 return Err(PyBufferError::new_err(format!(
-                    "dl_device: the array is on (2, {ordinal}) and cannot be had on {there:?} so; take it there, \
-                     and copy it"
+                    "dl_device: the array is on (2, {ordinal}), not on {there:?}; import it there, and then copy it"
                 )));
             }
         }
         if copy == Some(true) {
             return Err(PyBufferError::new_err(
-                "copy: the array is handed on without a copy; take it, and copy it there",
+                "copy: the array is shared without a copy; import it, and then copy it",
             ));
         }
         self.order(stream)?;

@@ -92,7 +92,7 @@ fn sequence_named(name: &str) -> PyResult<EulerSequence> {
 /// The axes of that name, and whether they are the world's, along the skeleton.
 pub(crate) fn axes_named(name: &str) -> PyResult<(Axes, bool)> {
     if name == "world" {
-        // A track that has no parent turns in the world.
+        // The parent of a track without a parent is the world.
         return Ok((Axes::Parent, true));
     }
     let axes = name.parse().map_err(|error: UnknownNameError| {
@@ -113,7 +113,7 @@ impl Engine {
             return Ok(self.engine.clone());
         };
         if let Some((process, large)) = large.get() {
-            // A device is not there in a process that was forked from that which opened it.
+            // A forked process cannot use the device that its parent process has opened.
             return Ok(match *process == std::process::id() {
                 true => large.clone(),
                 false => self.engine.clone(),
@@ -125,7 +125,7 @@ impl Engine {
                 host::auto(rotations, &options).map_err(|failure| of_host(&failure))
             })
         })?;
-        // Two threads may have chosen at once: both have the same bits.
+        // If two threads chose at the same time, both choices give the same bits.
         let chosen = chosen.unwrap_or_else(|| self.engine.clone());
         let chosen = large.get_or_init(|| (std::process::id(), chosen));
         Ok(chosen.1.clone())

@@ -64,7 +64,7 @@ impl Class {
             let object = self.object(py, message, found);
             object.map_or_else(|error| error, PyErr::from_value)
         });
-        // The interpreter has ended, and the error of work that was left behind is not read.
+        // If the interpreter has ended, no exception can be created; nobody reads the error of this work.
         made.unwrap_or_else(|| PyRuntimeError::new_err(message.to_owned()))
     }
 }

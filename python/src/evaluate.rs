@@ -111,7 +111,7 @@ impl OutputForm {
         let has_form = self.order != Order::Xyzw || self.encoding != Encoding::F32;
         if self.as_rotation && (has_form || out.is_some()) {
             return Err(input(
-                "as_rotation: SciPy's rotations have memory and an order of their own; leave out \
+                "as_rotation: SciPy's rotations have their own memory and order; leave out \
                  `order`, `dtype` and `out`",
             ));
         }
@@ -123,8 +123,8 @@ impl OutputForm {
         if along_skeleton && matches!(samples, SampleChoice::Each { .. } | SampleChoice::Ragged(_))
         {
             return Err(input(
-                "axes=\"world\": what a joint does in the world follows from its parents at the same times; \
-                 give one list of times for all tracks, or take the parent's axes",
+                "axes=\"world\": the velocity of a joint in the world depends on its parents at the same times; give \
+                 one list of times for all tracks, or use the parent's axes",
             ));
         }
         if let SampleChoice::Ragged(lists) = samples {
@@ -244,13 +244,13 @@ impl OutputForm {
                 "rotations of SciPy's are on the host; leave out `as_rotation`"
             }
             _ if self.order != Order::Xyzw => {
-                "what is on the card is x y z w; reorder it there, as q[..., [3, 0, 1, 2]]"
+                "results on the card are x y z w; reorder them there, as q[..., [3, 0, 1, 2]]"
             }
             _ if self.radians && !self.encoding.angles().is_empty() => {
                 "angles on the card are in degrees; leave out `degrees`, and convert them there"
             }
             _ if along_skeleton => {
-                "what joints do in the world is added up on the host; take the axes of the body or its parent"
+                "velocities in the world are computed on the host; use the axes of the body or its parent"
             }
             _ => return Ok(()),
         };
@@ -280,8 +280,8 @@ impl OutputForm {
             .is_none()
         {
             return Err(input(
-                "device_array: the file has other methods for some tracks than for others, and such results are put \
-                 together on the host; name one `method` for all",
+                "device_array: the file states different methods for its tracks, and such results are combined on the \
+                 host; name one `method` for all",
             ));
         }
         let array = py.detach(|| {

@@ -204,7 +204,7 @@ pub(crate) fn follow<'py>(
     }
     let up = |up: DVec3| {
         let up = up.as_vec3();
-        // Where a surface has no normal there is none.
+        // If the surface has no normal here, there is no upward direction.
         (up != Vec3::ZERO && !up.is_nan()).then_some(up)
     };
     let paths = (all.into_iter().zip(lists).zip(ups)).map(|((points, times), ups)| PathPoints {
@@ -273,7 +273,7 @@ pub(crate) fn follow<'py>(
         }
     };
     let rotations = of_values(py, &found.rotations, |of| order.of_xyzw(of))?;
-    // A path alone has no axis of tracks, and a time alone none of frames.
+    // A single path has no axis of tracks, and a single time has no axis of frames.
     let (track_axis, frame_axis) = match layout {
         Layout::TrackMajor => (0, 1),
         Layout::FrameMajor => (1, 0),

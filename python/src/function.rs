@@ -51,7 +51,7 @@ pub(crate) fn evaluate<'py>(
         let motion = work(py, arrays.key_count(), move || arrays.clip(None))?;
         let result = OutputForm {
             encoding: dtype.map_or(Ok(Encoding::F32), quaternions_of)?,
-            // Rotations of SciPy's have an order of their own.
+            // SciPy's rotations are always x y z w, so `order` does not apply.
             order: if as_rotation { Order::Xyzw } else { order },
             layout: layout_named(layout)?,
             as_rotation,

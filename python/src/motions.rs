@@ -599,7 +599,7 @@ impl Motions {
         let per_second = f64::from(self.tables.ticks_per_second());
         let step = |(&(clip, _), &time): (&(u32, u32), &f64)| {
             let (rate, length) = (rates[clip as usize], lengths[clip as usize]);
-            // A time within a millionth of a frame is at it.
+            // A time within a millionth of a frame counts as at the frame.
             let frame = (time.clamp(0.0, length) * rate + 1e-6).floor();
             let first = frame.min(((length * rate).round() - 1.0).max(0.0));
             FrameStep {

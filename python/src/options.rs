@@ -71,7 +71,7 @@ impl EvaluationKeywords {
                 "end" => end = Some(arrays::number(&value, "end", "seconds")?),
                 "method" => request.method = method_named(&text(&value, "method")?)?,
                 "ends" => request.options.ends = Some(ends(&value)?),
-                // Times outside can be left out, too, which the engine does not do.
+                // In Python, times outside the keys can also be left out, which the engine does not support.
                 "before" => request.outside.before = option_of(&value, "before")?,
                 "after" => request.outside.after = option_of(&value, "after")?,
                 _ => match InterpolationOption::named(&name) {
@@ -90,8 +90,8 @@ impl EvaluationKeywords {
         if leaves_out != [false; 2] && request.samples.as_ref().is_some_and(is_of_each) {
             let keyword = if leaves_out[0] { "before" } else { "after" };
             return Err(input(format!(
-                "{keyword}=\"leave-out\": a result has as many samples for each track; give one list of times for all \
-                 tracks, or leave out the times yourself"
+                "{keyword}=\"leave-out\": all tracks of a result have the same number of samples; give one list of \
+                 times for all tracks, or leave out the times yourself"
             )));
         }
         Ok(request)

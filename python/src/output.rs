@@ -98,8 +98,8 @@ pub(crate) fn array_of<'py>(
     }
     if !array.is_c_contiguous() {
         return Err(input(
-            "out: its numbers do not lie one behind the other (C order); a view of some of an \
-             array, or a transposed one, cannot be written to",
+            "out: its numbers are not contiguous (C order); a part of an array, or a transposed one, cannot be \
+             written to",
         ));
     }
     let (start, bytes) = (address(out)?, component.bytes());
@@ -182,7 +182,7 @@ pub(crate) fn filled_bytes(
     if let Ok(array) = array.cast::<PyArrayDyn<f32>>() {
         return filled(array, |numbers| work(bytemuck::cast_slice_mut(numbers)));
     }
-    // Components of 16 bits, whatever they mean.
+    // Both types of 16 bits (f16 and normalised integers) are written as u16.
     let numbers = array.call_method1(intern!(array.py(), "view"), ("uint16",))?;
     let numbers = numbers.cast_into::<PyArrayDyn<u16>>()?;
     let mut memory = numbers.try_readwrite().map_err(refused)?;

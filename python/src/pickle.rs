@@ -34,7 +34,7 @@ pub(crate) fn state<'py>(py: Python<'py>, clip: &Clip) -> PyResult<Bound<'py, Py
     let state = PyDict::new(py);
     let names: Vec<Option<&str>> = tracks.iter().map(|track| track.name).collect();
     state.set_item("names", names)?;
-    // Times that tracks share are there once.
+    // Times that several tracks share are stored once.
     let (times, mut times_of) = (PyList::empty(py), Vec::<i64>::new());
     let mut last: Option<&[f64]> = None;
     for track in &tracks {
@@ -367,7 +367,7 @@ fn motion_of(state: &Bound<'_, PyDict>) -> PyResult<Motion> {
             pelvis: Vec3::from_array(pelvis),
             shape,
         }),
-        // It is for the check of orders when a file is read.
+        // Only used when a file is read, to check the orders.
         robot: None,
     })
 }

@@ -135,7 +135,7 @@ pub(crate) fn reduce(
             .any(|channels| channels.has(ChannelInterpolation::Cubic))
     {
         return Err(input(
-            "its keys are joined by cubics with tangents, so they are not its samples; give `fps`",
+            "its keys are connected by cubics with tangents, so the keys alone are not enough; give `fps`",
         ));
     }
     let options = ReduceOptions {

@@ -354,7 +354,7 @@ pub(crate) fn add<'py>(
             }
         },
     };
-    // A reference that is none is refused as other rotations are.
+    // If the reference is not a rotation, it is refused with the same message as other rotations.
     rotations(&reference, 1, layout, "reference")?;
     let count = values.len();
     let engine = engine.engine_for(count)?;
@@ -386,7 +386,7 @@ impl<'py> ModelPoses<'_, 'py> {
     ) -> PyResult<Bound<'py, PyAny>> {
         let py = self.rotations.py();
         let ArrayValues { shape, values } = quaternions(self.rotations, order, "rotations")?;
-        // One pose is (tracks,).
+        // The shape of a single pose is (tracks,).
         let is_one = shape.len() == 1;
         let axes = match (&*shape, layout) {
             (&[tracks], _) => Axes { tracks, samples: 1 },

@@ -54,7 +54,7 @@ const CHUNK: usize = 1 << 20;
 /// `sequence`: the axes of BVH's angles, such as "ZXY". `linear`: names of arrays in an NPZ file, with a number
 /// for each frame, to be interpolated linearly instead of left out. `times_out`: for KITTI, which stores no times, a file
 /// for the times of the poses, one time in seconds per line. `end_frame`: what follows the last frame of `fps` if a clip
-/// ends between two frames: "key", a sample at the end; "hold", one frame more with the value of the end; "leave-out",
+/// ends between two frames: "key", a sample at the end; "hold", one more frame with the value of the end; "leave-out",
 /// nothing. By default formats with times get a key and others a held frame; NPY gets nothing. `quantize`: store glTF rotations with 16 bits a
 /// component, within 6e-5 rad. `meshopt`: compress a new glTF file by `EXT_meshopt_compression`. `engine`: the engine
 /// that evaluates; by default one that all calls share.
@@ -276,8 +276,8 @@ impl Save {
         if let Some(document) = self.document() {
             let SampleChoice::Rate(rate, None, None) = *samples else {
                 return Err(input(
-                    "the animations of a file that is kept keep their lengths; leave out `at`, \
-                     `start` and `end`, or write another format",
+                    "in a copy of the file, animations keep their lengths; leave out `at`, `start` and \
+                     `end`, or write another format",
                 ));
             };
             return self.baked(&motions, &*document, rate, out);
@@ -376,7 +376,7 @@ impl Save {
         }
         let sources = || self.clips.iter().filter_map(|clip| clip.source.as_ref());
         let is_changed = sources().any(|source| source.is_changed);
-        // All clips of a file as they are: everything stays.
+        // All clips of a file, unchanged: the whole file is copied.
         let is_whole = sources()
             .next()
             .is_some_and(|source| source.clips == self.clips.len());

@@ -200,7 +200,7 @@ impl Worker {
             record,
         };
         let worker = Arc::clone(&self.worker);
-        // Where Ctrl-C ends it, the evaluation of an input fails, and no record of the shard is written.
+        // If Ctrl-C stops the work, the evaluation of the current input fails, and no record of the shard is written.
         interruptible(py, move || {
             let mut worker = worker.lock().unwrap_or_else(PoisonError::into_inner);
             let outcome = worker.run(&task, &folder);

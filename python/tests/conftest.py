@@ -9,7 +9,7 @@ import sys
 import numpy as np
 import pytest
 
-# Processes that a shell starts in the background ignore Ctrl-C, as do their children; but the tests send it.
+# Background processes of a shell ignore Ctrl-C, and so do their child processes. The tests send it, so it is enabled.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
 ROOT = pathlib.Path(__file__).parents[2]

@@ -260,7 +260,7 @@ def test_what_is_refused(case):
     assert (error.file, error.line, error.column) == (None, None, None)
 
 
-# Mistakes that are not about values raise Python's exceptions.
+# Mistakes that are not about values raise Python's own exceptions.
 OTHERS = {
     "an unknown keyword": (dict(speeed="constant"), TypeError, "speeed"),
     "at and times": (dict(fps=None, at=[0.0], times_=[0.0]), TypeError, "another name"),
@@ -330,7 +330,7 @@ def test_keys_of_frames_are_read_by_their_layout():
         TIMES, by_frame, layout="frame", translations=moves_by_frame, velocities=list(moves_by_frame)
     )
     assert found == expected
-    # A list that contains None is one of tracks; where there are as many, others are frames all the same.
+    # A list that contains None is a list of tracks. Other lists of the same length are lists of frames.
     rooted = tumble.Clip(TIMES, KEYS, translations=[moves[0], None, None])
     assert tumble.Clip(TIMES, by_frame, layout="frame", translations=[moves[0], None, None]) == rooted
     square = [KEYS[:, :3], np.arange(27.0).reshape(3, 3, 3)]
@@ -365,7 +365,7 @@ def test_as_many_tracks_as_keys_need_a_layout(rng):
     assert np.array_equal(named.keys("b"), keys[1])
     assert np.array_equal(track.keys(1), keys[1])
     assert np.array_equal(tumble.Clip(times, keys, layout="frame").keys(1), keys[:, 1])
-    # Times of each track, and lists of tracks, say what the axes are.
+    # If times or lists are given for each track, the axes are known without `layout`.
     assert tumble.Clip([times] * 5, keys) == tumble.Clip(times, list(keys)) == track
 
 

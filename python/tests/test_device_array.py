@@ -71,7 +71,7 @@ def driver(tmp_path_factory):
         library("stub_cuda.c", *options, "-o", str(folder / name / "libcuda.so.1"))
         variables = {"LD_LIBRARY_PATH": str(folder / name), "STUB_CUDA_LOG": str(folder / name / "log")}
         if semaphores:
-            # The loader that it loads has the same name, and is not to take its place.
+            # The loader under test loads another loader of the same name, which must not replace it.
             options = ("-Wl,-soname,libvulkan.so.1", "-Wl,-z,nodelete")
             library("stub_vulkan.c", *options, "-o", str(folder / name / "libvulkan.so.1"))
             known = subprocess.run(["/sbin/ldconfig", "-p"], capture_output=True, text=True, check=True)
@@ -171,7 +171,7 @@ for engine in all:
     del array
     assert (alive(), files()) == (0, opened)
 
-    # After a device is lost, nothing is read from it, and no stream waits for a semaphore that is never signalled.
+    # After a device is lost, its memory is not read, and no stream waits for a semaphore that will not be signalled.
     array = evaluate(engine)
     array.numpy()
     os.environ["STUB_VULKAN_LOST"] = "1"
@@ -189,7 +189,7 @@ for engine in all:
     run(script, driver("failing", semaphores=True))
 
 
-# DLPack as its header has it, and what a consumer does.
+# The structures of DLPack's header, and the calls of a consumer.
 CONSUMER = """
 class Tensor(ctypes.Structure):
     _fields_ = [("data", ctypes.c_void_p), ("kind", ctypes.c_int32), ("ordinal", ctypes.c_int32),
@@ -268,7 +268,7 @@ for name in names:
     assert array.numpy().tobytes() == expected.tobytes()
     assert array.numpy().dtype == np.float32
 
-    # The stream that takes it waits for the engine, by the device's semaphore where it exports one.
+    # The stream that imports the array waits for the engine, by the device's semaphore if the device exports one.
     def waits(**options):
         calls()
         array.__dlpack__(**options)
@@ -281,7 +281,7 @@ for name in names:
     refused(lambda: waits(stream=0), "stream: 0 may be", error=BufferError)
     refused(lambda: waits(stream=-2), "there is no stream -2", error=BufferError)
 
-    # Which form is asked for, and where.
+    # The form of the capsule, and the device, that are requested.
     form = lambda **options: python.PyCapsule_GetName(array.__dlpack__(**options))
     assert form() == form(max_version=None) == form(max_version=(0, 8)) == b"dltensor"
     assert form(max_version=(1, 0)) == form(max_version=(1, 3)) == b"dltensor_versioned"
@@ -299,7 +299,7 @@ for name in names:
                          "strides": None, "stream": 1}
     assert ctypes.string_at(address, expected.nbytes) == expected.tobytes()
 
-    # Capsules that are not consumed, and capsules that are, before and after the array has gone.
+    # Capsules that are never consumed, and capsules that are consumed, before and after the array is freed.
     for options in [{}, {"max_version": (1, 0)}]:
         array.__dlpack__(**options)
         one, delete_one = consumed(array.__dlpack__(**options))
@@ -327,7 +327,7 @@ for name in names:
     order += ["cuDestroyExternalMemory", "cuCtxPopCurrent_v2"]
     assert given_back == order, given_back
 
-    # Its address was not read: no other work is waited for.
+    # Its address was not requested, so no other work is waited for.
     evaluate(engine)
     assert not any("cuCtxSynchronize" in call for call in calls())
 
@@ -350,7 +350,7 @@ for name in names:
         assert second.numpy().tobytes() == first.numpy().tobytes() == host.tobytes()
         del first, second
 
-    # Many of them, whose memory is others' again; and the engine goes first.
+    # Many arrays, whose memory is reused; and the engine is freed first.
     for round in range(50):
         held = [consumed(evaluate(engine).__dlpack__(stream=0x10 + round)) for _ in range(2)]
         for managed, delete in held:
@@ -366,7 +366,7 @@ for name in names:
     del array
     assert alive() == 0
 
-# A process that is forked from it has no driver, and touches none.
+# A forked process has no driver, and must not call it.
 array = evaluate(tumble.Engine(names[-1]))
 child = os.fork()
 if not child:

@@ -44,11 +44,11 @@ DRIVERS = int(os.environ.get("DRIVERS", "2"))
 
 TOOLS = pathlib.Path(sys.executable).parent
 FAULTS = pathlib.Path(__file__).parent / "faults"
-# Neither its logs nor more machines are asked for.
+# Ray's dashboard, log monitor and autoscaler are not needed.
 QUIET = {
     "include_dashboard": False, "include_log_monitor": False, "no_monitor": True, "object_store_memory": 80 << 20
 }
-# Eight clips or so.
+# About eight clips.
 SHARD = "64KiB"
 
 
@@ -106,7 +106,7 @@ class Machines:
 def machines():
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("RAY_USAGE_STATS_ENABLED", "0")
-        # Workers that start with a fault look here.
+        # Workers import modules from here, which make them start with a fault.
         patch.setenv("PYTHONPATH", str(FAULTS), prepend=os.pathsep)
         found = Machines()
         yield found
@@ -226,7 +226,7 @@ def test_workers_are_killed(connected, library):
         report = evaluate(library / "clips", out, fps=240, shard_bytes="8KiB")
         ended.set()
         thread.join()
-        # A shard whose end was not heard of is found to be done.
+        # If the end of a shard was not reported, its record is found later.
         assert (report.made + report.skipped, report.failed) == (CLIPS, [])
     assert kills >= KILLS
     rename_inputs(out, f"{library}/", "")
@@ -256,7 +256,7 @@ def test_nodes_are_lost(machines, connected, library):
         report = evaluate(library / "clips", out, fps=240, shard_bytes="8KiB", progress=lose)
         losing.join()
         assert begun[0] < CLIPS, "it was lost in the middle"
-        # A shard whose end was not heard of is found to be done.
+        # If the end of a shard was not reported, its record is found later.
         assert (report.made + report.skipped, report.failed) == (CLIPS, [])
         rename_inputs(out, f"{library}/", "")
         assert_equal(library / "one", out)
@@ -291,7 +291,7 @@ def test_a_node_that_is_added_works(machines, connected, library, tmp_path):
 def test_drivers_are_killed(machines, library):
     out = library / "drivers"
     stopped = 0
-    # A shard a clip: the driver is busy long enough to be stopped, whatever else this machine does.
+    # One clip per shard, so that the driver is busy long enough to be stopped.
     more = ["--resume", "--address", machines.address]
     line = command("clips", "drivers", *more, shard="1KiB")
     rounds = 0
@@ -319,7 +319,7 @@ def test_drivers_are_killed(machines, library):
     assert stopped == DRIVERS
     done = subprocess.run([*line, "--json"], cwd=library, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
-    # Ray may say before it that a node was lost.
+    # Ray may print a line about a lost node before the report.
     report = json.loads(done.stdout[done.stdout.index("{\n") :])
     assert (report["made"] + report["skipped"], report["exit_code"]) == (CLIPS, 0)
     assert f"{report['made']} made, {report['skipped']} skipped, 0 failed" in done.stderr
@@ -355,7 +355,7 @@ def test_ctrl_c_in_a_program_of_ones_own(machines, connected, library, tmp_path)
         if is_done:
             shutil.rmtree(out)
     assert interrupted
-    # A task that ends after the results are merged would leave the record of its shard.
+    # If a task ended after the results are merged, the record of its shard would be left.
     ray.shutdown()
     connect(machines)
     report = evaluate(library / "clips", out, fps=240, shard_bytes="8KiB")
@@ -366,7 +366,7 @@ def test_ctrl_c_in_a_program_of_ones_own(machines, connected, library, tmp_path)
 
 def test_inputs_that_fail_are_named(connected, library, tmp_path, monkeypatch):
     """One kills its worker, one is refused, one is too large; all others are done."""
-    # Each further try is a worker that is started and ends.
+    # Each retry starts a worker, which takes seconds.
     monkeypatch.setattr(_driver, "_RETRIES", 1)
     clips = tmp_path / "clips"
     for path in sorted((library / "clips").rglob("*.dat"))[:3]:

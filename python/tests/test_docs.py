@@ -18,7 +18,7 @@ from conftest import ROOT, SHARED
 
 import tumble
 
-# Where the package lies; its stubs are beside it.
+# The folder of the package, which also has its stubs.
 PACKAGE = pathlib.Path(tumble.__file__).parent
 
 
@@ -119,7 +119,7 @@ def mypy(*arguments, cwd):
 
 
 def test_types_are_those_of_the_stubs(tmp_path):
-    # Reading the types of other packages takes most of the time; the checks below read them.
+    # Most of the time is spent reading the types of other packages; the checks below reuse these.
     settings = tmp_path / "mypy.ini"
     settings.write_text("[mypy]\n[mypy-numpy.*,scipy.*,matplotlib.*,pyarrow.*]\nfollow_imports = skip\nfollow_imports_for_stubs = True\n")
     mypy("mypy.stubtest", "tumble", "--mypy-config-file", str(settings), cwd=tmp_path)

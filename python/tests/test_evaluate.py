@@ -134,7 +134,7 @@ def test_results_go_where_they_are_told(clip, engine):
     out = np.empty_like(expected)
     assert engine.evaluate(clip, fps=60, out=out) is out
     assert np.array_equal(out, expected)
-    # A part of a larger array, aligned as float32 and no better.
+    # A part of a larger array, which is only aligned to 4 bytes.
     store = np.zeros(expected.size + 1, np.float32)
     part = store[1:].reshape(expected.shape)
     assert clip.evaluate(fps=60, out=part) is part and np.shares_memory(part, store)
@@ -203,7 +203,7 @@ def test_rotations_of_scipys_in_and_out(rng):
     keys = Rotation.random(8, rng=rng)
     expected = tumble.evaluate(np.arange(8), keys.as_quat(), fps=10)
     assert np.array_equal(tumble.evaluate(np.arange(8), keys, fps=10), expected)
-    # They are x y z w, whatever the arrays beside them are.
+    # SciPy's rotations are x y z w, whatever `order` says about arrays.
     assert np.array_equal(
         np.roll(tumble.evaluate(np.arange(8), keys, fps=10, order="wxyz"), -1, axis=-1), expected
     )
@@ -397,7 +397,7 @@ def test_times_outside_the_keys_are_left_out(clip, engine, tmp_path):
             engine.evaluate(clip, at=at, after="leave-out")
     with pytest.raises(tumble.InputError, match="before: there is no `leave`; there are hold, .*, leave-out"):
         engine.evaluate(clip, fps=4, before="leave")
-    # Clips of a clock keep theirs, and the sample at the end of a clip is its last key.
+    # The times of a clip with a clock stay on this clock, and the sample at the end of the clip is its last key.
     late = tumble.Clip(1e9 + TIMES + 0.125, clip.keys(0))
     found = engine.evaluate(late, fps=4, start=1e9, end=1e9 + 3, **both)
     assert np.array_equal(found, engine.evaluate(late, at=1e9 + np.arange(1, 9) / 4))

@@ -151,6 +151,6 @@ def test_ours_are_nearer_than_differences():
     rows = [[float(cell) for cell in row.split("|")[2:4]] for row in velocity_rows()]
     peers, smoothed, lines, default, c2 = rows
     assert c2[0] < default[0] < peers[0] / 3 and default[1] < peers[1] / 3
-    # Why linear curves are never the default, and what smoothing costs.
+    # Linear curves have larger errors than the default, and so does smoothing.
     assert lines[0] > peers[0] and smoothed[0] > peers[0]
     assert stride_row()[1] == 60

@@ -103,7 +103,7 @@ def test_root_motion_and_the_rest_are_the_motion(axis):
     left = features.heading(upright, order="xyzw", up="z", axis=axis)
     np.testing.assert_allclose(left, 0, atol=1e-14)
     assert np.abs(np.diff(headings)).max() < 0.3  # whole turns are counted
-    # Counted loop by loop.
+    # Computed loop by loop, for comparison.
     step = Rotation.from_euler("z", headings[-1] - headings[0])
     expected = places
     for loops in range(1, 6):

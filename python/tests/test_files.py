@@ -107,7 +107,7 @@ def test_positions_of_maps_keep_their_digits(tmp_path):
     assert (positions.dtype, rotations.dtype) == (np.float64, np.float32)
     expected = np.linspace([458074.604, 5429380.172, 162.5], [458074.614, 5429380.182, 162.5], 11)
     assert np.abs(positions[0] - expected).max() < 1e-6
-    # Arrays are kept likewise.
+    # Arrays are stored in the same way.
     times, keys = clip.translations(0)
     made = tumble.Clip(times, [np.tile([0, 0, 0, 1], (2, 1))], translations=[keys])
     assert made.origins.tolist() == clip.origins.tolist()
@@ -375,13 +375,13 @@ def test_what_a_file_holds_beside_its_clips_is_named_where_it_is_left_out(tmp_pa
         ours = [text for text in found if text.startswith(str(path))]
         assert len(ours) == 1, found
         assert ours[0].endswith(f"warning[W208]: bvh cannot store this, left out: {BESIDE}")
-    # The program says it in the same words.
+    # The program prints the same words.
     printed = program("convert", path, "--animation", "Nod", "-o", tmp_path / "printed.bvh").stderr
     assert f"bvh cannot store this, left out: {BESIDE}" in printed
-    # A file of the same format keeps all, or is a new one.
+    # A file that is written in its format keeps everything; a result with only one of the clips is a new file.
     assert said("all.glb", file) == [] and said("baked.glb", file["Nod"], fps=30) == []
     assert len(tumble.load(tmp_path / "baked.glb")) == 2
-    # Nor has a new file a mesh that weights could move.
+    # A new file has no mesh whose weights could be animated.
     lost = "GLB cannot store this, left out: the scalars"
     found = said("one.glb", file["Nod"])
     assert [text.split("]: ")[1] for text in found] == [
@@ -424,7 +424,7 @@ def test_other_keys_go_into_the_file_of_a_clip(tmp_path):
     for suffix in ["npz", "glb"]:
         tumble.save(tmp_path / f"placed.{suffix}", placed)
         assert np.array_equal(tumble.load(tmp_path / f"placed.{suffix}").clip.offsets, placed.clip.offsets)
-    # Offsets in the file are replaced, in the result of the same format too, and this is told.
+    # Offsets in the file are replaced, also in a result of the same format, with a warning.
     with pytest.warns(tumble.InputWarning, match=r"offsets of 2\d joints in the file are replaced"):
         far = tumble.load(tmp_path / "placed.glb", offsets=2 * offsets)
     tumble.save(tmp_path / "far.glb", far)
@@ -483,7 +483,7 @@ def test_python_minus_m_is_the_program():
     assert "slerp" in program("methods").stdout
     assert "Usage: tumble" in program("eval", code=2).stderr
     assert "nowhere.dat" in program("info", "nowhere.dat", code=4).stderr
-    # The process that loads the drivers is Python too.
+    # The process that loads the drivers also runs Python.
     named = program("devices").stdout
     assert all(name in named for name in tumble.devices())
 
@@ -551,7 +551,7 @@ def test_parents_and_offsets_come_back(tmp_path, rng, name, recwarn):
     again = tumble.load(tmp_path / name).clip
     assert (again.names, again.parents) == (clip.names, clip.parents)
     assert np.array_equal(again.offsets, offsets)
-    # The rows of a table may come in another order. Lines join the keys of glTF, which a warning says.
+    # The rows of a table may be in another order. A warning says that glTF connects keys by lines.
     messages = [str(warning.message) for warning in recwarn if issubclass(warning.category, tumble.InputWarning)]
     assert ["W208" in message for message in messages] == [True] * (name == "walk.glb")
     tumble.save(tmp_path / f"baked-{name}", clip, fps=60)

@@ -103,7 +103,7 @@ warnings.showwarning = lambda *_: None
 rng = np.random.default_rng(1)
 
 class Slow(list):
-    # Arrays are made of it by Python code.
+    # Python code converts it to an array.
     def __init__(self, of=(0.0, 1.0)):
         super().__init__(of)
     def __array__(self, dtype=None, copy=None):
@@ -200,8 +200,9 @@ for name, (call, output) in calls.items():
             deadline = time.monotonic() + delay + 15
             while time.monotonic() < deadline:  # a call that ends sooner is made again
                 work()
-                # The system may deliver the signal to another thread. Up to Python 3.12, the main thread then sees it
-                # when it takes the interpreter's lock again, and in a loop of calls that keep the lock never.
+                # The system may deliver the signal to another thread. Up to Python 3.12, the main thread then notices
+                # it only when it takes the interpreter's lock. In a loop of calls that keep the lock, this never
+                # happens.
                 time.sleep(0)
             ended = time.monotonic()
             found["swallowed"] += 1
@@ -217,7 +218,7 @@ for name, (call, output) in calls.items():
             found["after the call"] += 1
             sent = sending.stdout.readline()
         longest = max(longest, ended - float(sent))
-        # Files that are left behind vanish by themselves.
+        # Wait until the files that were left are removed.
         for _ in range(500):
             left = set(os.listdir()) - before - {output}
             if not left:

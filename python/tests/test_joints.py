@@ -75,7 +75,7 @@ def test_other_orders_are_the_same_motion(keys, rng, order):
 
 
 def test_other_clocks_and_rates_are_the_same_motion(keys):
-    # The same keys on another clock, and every second of them.
+    # The same keys on another clock, from the second at which it begins.
     first, later = made(keys), made(keys, ORDERS[1], times=TIMES + 1e9)
     coarse = made(keys[:, ::2], ORDERS[0], times=TIMES[::2])
     positions, rotations = states([first, later, coarse], [0.0, 2 / 30])
@@ -86,7 +86,7 @@ def test_other_clocks_and_rates_are_the_same_motion(keys):
     a, b, c = crowd.evaluate("model")
     np.testing.assert_allclose(b, a, atol=1e-5)
     np.testing.assert_allclose(c, a, atol=1e-6)
-    # The times are those of the first clip, wherever the keys of the other lie.
+    # The times are those of the first clip. The other clip is evaluated there.
     found = tumble.compare(coarse, first, at=TIMES[::2])
     assert (found.tracks, found.samples) == (5, 2) and found.rotation.largest < 1e-6
 
@@ -94,7 +94,7 @@ def test_other_clocks_and_rates_are_the_same_motion(keys):
 def test_clips_of_other_clocks_are_compared_where_both_have_keys(keys):
     first, shifted = made(keys), made(keys, ORDERS[0], times=TIMES + 1 / 30)
     found = tumble.compare(first, shifted)
-    # The same keys a frame later are another motion.
+    # Keys that are one frame late are a different motion.
     assert found.rotation.largest > 0.1
     with pytest.raises(tumble.InputError, match="no time|in common|overlap"):
         tumble.compare(first, made(keys, times=TIMES + 1e9))
@@ -166,7 +166,7 @@ def test_animations_of_a_file_may_move_different_joints(rig):
             np.testing.assert_allclose(model[index, ..., 3], np.array(positions)[joints], atol=1e-6)
             for joint, found in zip(joints, Rotation.from_quat(state.rotations[0])):
                 assert (rotations[joint].inv() * found).magnitude() < 1e-6, (name, joint)
-    # A clip that is made of arrays has nothing that says where the others rest.
+    # A clip made of arrays has no rest poses for the other joints.
     kick = rig["kick"]
     alone = tumble.Clip(
         [kick.times(name) for name in kick.names], [kick.keys(name) for name in kick.names], names=kick.names, parents=kick.parents,
@@ -216,7 +216,7 @@ def test_other_joints_are_refused(keys):
         ]:
             with pytest.raises(tumble.InputError, match=words):
                 combine()
-        # Tracks of one of the clips alone are listed.
+        # Tracks that only one of the clips has are listed.
         if len(other) == 5 and "rig" not in words:
             with pytest.raises(tumble.InputError, match=words):
                 tumble.compare(first, other)
@@ -225,7 +225,7 @@ def test_other_joints_are_refused(keys):
             TIMES, keys[[0, 1, 2, 3, 4, 0]], names=[*NAMES, "extra"], parents=[*PARENTS, 0], offsets=np.ones((6, 3))
         )
         tumble.MotionLibrary([first, more])
-    # Both without names: by index, and as many.
+    # Two clips without names are matched by index, if they have equally many tracks.
     unnamed = made(keys, names=None)
     positions, _ = states([unnamed, made(keys, names=None)], TIMES)
     assert np.array_equal(positions[0], positions[1])
@@ -260,7 +260,7 @@ def test_each_clip_keeps_its_offsets(keys):
     crowd.set([0, 1], [0, 1])
     a, b = crowd.evaluate("model")[..., 3]
     np.testing.assert_allclose(b, 2 * a, atol=1e-5)
-    # A skeleton that is chosen holds for all.
+    # A given skeleton applies to all clips.
     for skeleton in [small, (PARENTS, OFFSETS)]:
         positions, _ = states([small, large], TIMES, skeleton=skeleton)
         np.testing.assert_allclose(positions[1], positions[0], atol=1e-6)
@@ -319,7 +319,7 @@ def test_a_skeleton_places_the_joints_of_a_body(body):
         np.testing.assert_allclose(found, expected, rtol=1e-6)
     crowd = tumble.Crowd([clip], 1, parents=clip.parents, offsets=offsets)
     np.testing.assert_allclose(crowd.evaluate("model")[..., 3], expected, rtol=1e-6)
-    # Beside a clip that has offsets, one without them has no positions still.
+    # If another clip has offsets, a clip without offsets still has no positions.
     library = tumble.MotionLibrary([placed, clip])
     np.testing.assert_allclose(library.sample([0], [0.0]).positions, expected, rtol=1e-6)
     with pytest.raises(tumble.InputError, match="body_model"):
@@ -339,7 +339,7 @@ def test_a_body_model_places_the_joints_of_its_body(tmp_path):
     np.testing.assert_allclose(state[1::2], state[::2], atol=1e-5)
     female = tumble.load(folder / "female.npz", body_model=folder / "models/SMPL_FEMALE.npz").clip
     assert np.abs(female.offsets - male.offsets).max() > 0.01
-    # Each keeps its bones; a skeleton that is chosen holds for both.
+    # Each clip keeps its bones; a given skeleton applies to both.
     own = tumble.MotionLibrary([male, female]).sample([1], [0.0]).positions
     expected = tumble.Engine("cpu").world(female, at=[0.0], layout="frame")[0]
     np.testing.assert_allclose(own, expected, atol=1e-5)
@@ -368,7 +368,7 @@ def test_offsets_with_names_are_matched_by_name(body, tmp_path):
     found = np.load(result)
     assert found.shape == (31, len(clip), 7)
     np.testing.assert_allclose(found[..., :3], expected, rtol=1e-6, atol=1e-6)
-    # So are those of a dict.
+    # The offsets of a dict are assigned by name, too.
     by_name = dict(zip(reversed(clip.names), offsets[::-1].tolist()))
     assert tumble.load(body, offsets=by_name).clip == tumble.load(body, offsets=offsets).clip
     by_name.pop(clip.names[3])
@@ -389,7 +389,7 @@ def test_joints_of_one_name_are_told_to_be_matched_by_their_order(keys):
         tumble.Crowd(beside, 1)
     with pytest.warns(tumble.InputWarning, match=words):
         tumble.compare(*beside)
-    # One clip is matched with none, and parents tell joints apart.
+    # A clip with one track matches none; parents distinguish joints with equal names.
     chain = [tumble.Clip(TIMES, keys[:3], names=["hip", "leg", "leg#2"], parents=[None, 0, 1], offsets=OFFSETS[:3]) for _ in range(2)]
     with warnings.catch_warnings():
         warnings.simplefilter("error")

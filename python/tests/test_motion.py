@@ -90,7 +90,7 @@ def test_states_are_those_of_the_engine(clips, rng):
 def test_velocities_are_those_of_differences(clips, rng, method):
     library = tumble.MotionLibrary(clips, method=method)
     ids = np.full(200, 2)
-    # Within a frame: rates of slerp jump between frames.
+    # Times inside frames, because rates of slerp jump at frames.
     times = (rng.integers(0, 190, 200) + rng.uniform(0.1, 0.9, 200)) / 120
     state, step = library.sample(ids, times), 2e-4
     before, after = library.sample(ids, times - step), library.sample(ids, times + step)
@@ -394,21 +394,21 @@ def test_a_folder_of_amass_is_shaped_while_it_is_read(tmp_path):
         ("shape.npz", "E320"),
     ]
     assert "no clip" in library.skipped[0].message
-    # Every fourth frame, of the joints that were named.
+    # Every fourth frame, only of the named joints.
     times = np.arange(31) / 30
     found = library.sample(0, times)
     for joint, source in enumerate([0, 3, 1, 2, 4]):
         expected = Rotation.from_rotvec(poses[::4, source])
         turned = Rotation.from_quat(found.rotations[:, joint].astype(float))
         assert (turned.inv() * expected).magnitude().max() < 1e-6
-    # The pelvis is where `trans` puts it and the body has it.
+    # The position of the pelvis is `trans` plus the pelvis offset of the body.
     np.testing.assert_allclose(found.positions[:, 0], trans[::4] + 1, atol=1e-5)
     by_index = tumble.MotionLibrary.load(
         tmp_path / "a_poses.npz", fps=30, tracks=[0, 3, 1, 2, 4], offsets=np.ones((52, 3))
     )
     np.testing.assert_array_equal(by_index.sample(0, times).positions, found.positions)
     for wrong, words in [
-        ({"tracks": ["pelvis", "left_knee"]}, "`left_knee` hangs on `left_hip`, which is left out"),
+        ({"tracks": ["pelvis", "left_knee"]}, "`left_knee` is a child of `left_hip`, which is left out"),
         ({"tracks": ["pelvis", "left_hand"]}, "a_poses.npz: tracks: there is no joint `left_hand`"),
         ({"tracks": [0, 99]}, "there is no joint 99; there are 52"),
         ({"tracks": [0, 0]}, "the joint 0 stands twice"),

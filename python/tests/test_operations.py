@@ -232,7 +232,7 @@ def test_a_clip_is_smoothed_with_all_that_it_has(rng, engine, tmp_path):
     assert isinstance(calm, tumble.Clip)
     assert (calm.name, calm.names, calm.parents) == (clip.name, clip.names, clip.parents)
     assert np.array_equal(calm.offsets, clip.offsets)
-    # The bits of arrays smoothed alone, at the keys.
+    # The same bits as smoothed arrays, at the keys.
     found = engine.smooth(engine.evaluate(clip, at=times), kernel="box:3")
     for joint in range(3):
         assert np.array_equal(calm.times(joint), times)
@@ -240,7 +240,7 @@ def test_a_clip_is_smoothed_with_all_that_it_has(rng, engine, tmp_path):
     (_, moved), (_, scaled) = calm.translations(0), calm.scales(1)
     assert np.array_equal(moved, engine.smooth(clip.translations(0)[1], kernel="box:3"))
     assert calm.translations(1) is None and (scaled == 2).all() and calm.scales(0) is None
-    # As the program does it, at a rate too.
+    # The same result as the program's, also at a rate.
     tumble.save(tmp_path / "keys.npz", clip)
     program("smooth", "keys.npz", "--low-pass", "4", "--fps", "60", "-o", "calm.npz", cwd=tmp_path)
     theirs = tumble.load(tmp_path / "calm.npz").clip
@@ -248,7 +248,7 @@ def test_a_clip_is_smoothed_with_all_that_it_has(rng, engine, tmp_path):
     for joint in range(3):
         assert np.array_equal(ours.keys(joint), theirs.keys(joint))
     assert np.array_equal(ours.translations(0)[1], theirs.translations(0)[1])
-    # Keys that are not even have to be sampled.
+    # Keys at uneven times must be sampled.
     uneven = tumble.Clip([0.0, 1.0, 3.0], noisy[0, :3])
     with pytest.raises(tumble.InputError, match="not evenly spaced.*give `fps`"):
         engine.smooth(uneven)
@@ -483,7 +483,7 @@ def test_ways_keep_clear_and_walkers_wait(engine):
     mover = ([0.0, 10.0], [[1, 0, 4], [1, 0, 4]], 0.5)
     with pytest.warns(tumble.InputWarning, match=r"routes\[0\]"):
         assert tumble.walk(routes[:1], speed=1.0, radius=0.25, movers=[mover])[0] is None
-    # A body walks the way.
+    # A body moves along the route.
     positions, _ = engine.follow(first.times, first.points, ups=first.normals, fps=10, method="linear")
     assert np.abs(positions[:, 0] - np.linspace(1, 7, 61)).max() < 1e-5
 
@@ -700,7 +700,7 @@ def test_layers_masks_and_skinning(walks, engine, rng):
             call()
 
 
-# All of them
+# All at once.
 
 
 def test_every_device_gives_the_same_bits(rng, walks):

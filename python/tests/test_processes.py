@@ -17,7 +17,7 @@ from conftest import unit
 
 import tumble
 
-# A test that hangs fails after so many seconds.
+# A test that takes longer is stopped [s].
 LIMIT = 60
 
 
@@ -202,7 +202,7 @@ def test_files_and_engines_are_pickled(clip, tmp_path):
     file = tumble.load(path)
     for other in copies(file):
         assert (other.names, other.path, other.clips) == (file.names, file.path, file.clips)
-    # Equal files have equal clips, wherever they lie; and the same reasons why others could not be read.
+    # Equal files have equal clips in different folders, and files that cannot be read have the same messages.
     elsewhere = tmp_path / "folder" / "wave.glb"
     elsewhere.parent.mkdir()
     elsewhere.write_bytes(path.read_bytes())

@@ -34,7 +34,7 @@ def test_motions_keep_their_rotations_and_times(rng):
     here, there = (tumble.Engine("cpu").world(it, fps=30, method="slerp")[0] for it in (found, source))
     np.testing.assert_allclose(here, 2 * there, atol=1e-4)
     assert report["largest_difference"] < 1e-6 and report["ends"] == {} and report["below_ground"] == 0
-    # At the frame that is the rest pose, the target rests.
+    # At the frame that defines the rest pose, the target is in its rest pose.
     found, _ = tumble.retarget(source, target, bones=bones, rest="same", rest_frame=2)
     np.testing.assert_allclose(np.abs(found.keys("arm")[2]), [0, 0, 0, 1], atol=1e-6)
     with pytest.raises(tumble.InputError, match="no frame 6; the source has 6"):

@@ -44,7 +44,7 @@ def test_bodies_follow_from_joints(arm):
     np.testing.assert_allclose(found["body_ang_vel_w"][3], [0, 0, 0])
     at_mass = arm.forward([0.0, 0.0], order="wxyz", joint_vel=[0.0, 3.0], velocity_at="mass")
     np.testing.assert_allclose(at_mass["body_lin_vel_w"][2], [0, 1.5, 0], atol=1e-15)
-    # A root pose that is left out is the file's.
+    # If the root pose is not passed, it is that of the file.
     np.testing.assert_allclose(at_mass["body_pos_w"][0], [0, 0, 1])
     many = arm.forward(np.zeros((5, 2, 2)), order="xyzw", body_order="breadth-first")
     assert many["body_pos_w"].shape == (5, 2, 4, 3)
@@ -72,7 +72,7 @@ def test_quaternions_of_no_stated_order_are_refused(arm):
 
 def test_motions_are_interpolated_in_joints(arm):
     engine = tumble.Engine("cpu")
-    # The wrist, which has no limits, goes on past half a turn.
+    # The wrist has no limits, so its angle continues beyond half a turn.
     keys = [[0.0, 3.0], [0.2, 3.4 - 2 * np.pi], [0.4, 3.8 - 2 * np.pi]]
     root = [[0, 0, 1], [1, 0, 1], [2, 0, 1]]
     still = np.tile([1, 0, 0, 0], (3, 1))
@@ -150,7 +150,7 @@ def test_scalars_are_evaluated_and_kept():
     np.testing.assert_allclose(found, [[0.1, 0.25, 0.4, 0.3, 0.2], [0, 0.25, 0.5, 0.75, 1]], rtol=1e-6)
     assert found.dtype == np.float32
     rates = engine.scalars(clip, at=[0.0, 0.5, 1.0], method="slerp", quantity="velocity", names=["knee"], layout="frame")
-    # At a key that of the interval after it, at the last key that of the last interval.
+    # At a key, the rate of the interval after it; at the last key, that of the last interval.
     np.testing.assert_allclose(rates, [[0.6], [-0.4], [-0.4]], rtol=1e-6)
     np.testing.assert_array_equal(engine.scalars(clip, fps=4, quantity="acceleration", method="slerp"), 0)
     again = pickle.loads(pickle.dumps(clip))

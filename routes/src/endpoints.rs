@@ -53,7 +53,7 @@ pub(crate) fn locate_endpoints(
     };
     let off = [start.distance, goal.distance];
     let start = inserter.vertex(start);
-    // The goal's face may have been cut by the start.
+    // Inserting the start may have divided the goal's face.
     let near = |face: &usize| nearest_on(&inserter.surface, *face, goal.point);
     let pieces = inserter.changed.contains(&goal.face);
     let cut = inserter.changed.iter().map(near);
@@ -91,7 +91,7 @@ impl VertexInserter<'_> {
         let largest = corners
             .iter()
             .fold(0.0, |max: f64, c| max.max(c.abs().max_element()));
-        // Far from the origin positions themselves are rounded to more than that.
+        // Far from the origin, positions are rounded by more than that.
         let least = ON_EDGE.max(4.0 * f64::EPSILON * largest / longest);
         let inside: Vec<usize> = (0..3).filter(|&k| at.weights[k] > least).collect();
         let face = self.surface.faces[at.face];

@@ -25,7 +25,7 @@ pub(crate) fn find_path(task: &Task<'_>) -> Vec<Spot> {
             if visited[other as usize] {
                 continue;
             }
-            // The goal itself is nearest of all, also where an edge to another vertex runs on.
+            // The goal itself is preferred to an edge that leads in the same direction to another vertex.
             let edge = (surface.positions[other as usize] - here).normalize_or_zero();
             let cosine = if other == task.goal {
                 2.0

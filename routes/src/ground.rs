@@ -126,7 +126,7 @@ impl<'a> Ground<'a> {
         let mut triangles: Vec<[u32; 3]> = level
             .filter(|corners| is_level(corners.map(|vertex| positions[vertex as usize])))
             .collect();
-        // Halves of a triangle that is free are free, and so for one that is closed.
+        // Both halves of a free triangle are free, and both halves of a closed one are closed.
         let mut classes = vec![TriangleClass::Open; triangles.len()];
         loop {
             let corners = |triangle: &[u32; 3]| triangle.map(|vertex| positions[vertex as usize]);
@@ -284,7 +284,7 @@ fn halve(
         let middle = |one, other| middles.get(&edge(one, other)).copied();
         let side = longest_sides[index];
         let [a, b, c] = [0, 1, 2].map(|k| triangle[(side + k) % 3]);
-        // The longest edge a-b first, then the rest of the others.
+        // First divide the longest edge a-b, then the others.
         let Some(ab) = middle(a, b) else { continue };
         let mut parts = Vec::with_capacity(4);
         match middle(b, c) {

@@ -18,7 +18,7 @@ pub(crate) fn find_path(task: &Task<'_>) -> Result<Vec<Spot>, RouteError> {
     let surface = &*task.surface;
     let normal = plane_normal(task)?;
     let start = surface.positions[task.start as usize];
-    // The distance of start and goal from the plane is 0, whatever rounding makes of it.
+    // Start and goal are in the plane, so their distance is 0, also where rounding differs.
     let mut heights: Vec<f64> = (surface.positions.iter().zip(0..))
         .map(
             |(&position, vertex)| match vertex == task.start || vertex == task.goal {
@@ -27,8 +27,8 @@ pub(crate) fn find_path(task: &Task<'_>) -> Result<Vec<Spot>, RouteError> {
             },
         )
         .collect();
-    // A vertex in the plane counts as above it, so that every cut of a face has two ends. Where
-    // that leads nowhere, as along a boundary, it counts as below.
+    // A vertex in the plane counts as above it, so that every cut of a face has two ends. If this leads nowhere, as
+    // along a boundary, such vertices count as below in a second attempt.
     for _ in 0..2 {
         let cut = PlaneCut {
             task,
@@ -103,7 +103,7 @@ impl PlaneCut<'_> {
         let faces = &self.surface.faces;
         let mut path = vec![Spot::vertex(self.task.start)];
         let mut half_edge = exit;
-        // The cut passes each face once.
+        // The cut crosses each face at most once.
         for _ in 0..=faces.len() {
             let (from, to) = (at(faces, half_edge), at(faces, next(half_edge)));
             if from == self.task.goal || to == self.task.goal {

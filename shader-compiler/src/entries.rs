@@ -151,7 +151,7 @@ impl One<'_> {
     /// Its parameters with its result, and the arguments that pass them on.
     fn signature(&self, types: &Types<'_>) -> (String, String) {
         let ty = |ty| types.name(ty).unwrap_or_default();
-        // An entry point's arguments come from the machine.
+        // The arguments of an entry point are provided by the machine.
         let arguments = match self.name {
             "main" => &[],
             _ => &self.function.arguments[..],
@@ -222,7 +222,7 @@ impl Called {
 /// The names of the kernels' variables, and for each kernel those that it binds.
 fn globals(kernels: &[Source<'_>]) -> String {
     let (mut all, mut private, mut entries) = (BTreeSet::new(), BTreeSet::new(), String::new());
-    // Many kernels bind the same.
+    // Many kernels have the same bindings, so each list is written once.
     let mut bound = Vec::<String>::new();
     for kernel in kernels {
         let texels = format!("{}_texels", kernel.name);
@@ -304,7 +304,7 @@ impl Names {
                 of.insert(signature);
             }
         }
-        // A function waits if it has a barrier, asks the other lanes of its subgroup, or calls one that waits.
+        // A function is async if it has a barrier, uses the other lanes of its subgroup, or calls an async function.
         loop {
             let before = names.waits.len();
             for kernel in kernels {
@@ -317,7 +317,7 @@ impl Names {
                 }
             }
             if names.waits.len() == before {
-                // All entry points are called alike.
+                // All entry points have the same signature.
                 names.waits.insert("main".to_owned());
                 return names;
             }
@@ -588,7 +588,7 @@ impl<'a> Writer<'a> {
                     reject,
                 } => {
                     let condition = self.value(*condition)?;
-                    // Loops end by `if` with nothing in it, and `else`.
+                    // naga ends loops by an `if` whose first branch is empty. The condition is inverted instead.
                     let (condition, accept, reject) = match accept.is_empty() {
                         true => (format!("!{}", condition.within(UNARY)), reject, accept),
                         false => (condition.text, accept, reject),
@@ -847,7 +847,7 @@ impl<'a> Writer<'a> {
                 let constant = &module.constants[constant];
                 let init = &module.global_expressions[constant.init];
                 match (constant.name.as_deref(), init) {
-                    // Each store has its own.
+                    // Each store has its own value of this constant, so the literal is written.
                     (Some(PARTS), Expression::Literal(literal)) => Self::literal(*literal),
                     (Some(name), Expression::Literal(Literal::F32(_))) => {
                         Ok(atom(format!("M::F::of({name})")))
@@ -897,7 +897,7 @@ impl<'a> Writer<'a> {
                     Ok(atom(format!("machine.load::<{ty}>(Global::{name}, {at})")))
                 }
             },
-            // A texel buffer lies in memory as its texels of four words.
+            // In memory, a texel buffer is an array of texels of four words.
             Expression::ImageLoad {
                 image, coordinate, ..
             } => {
@@ -1012,8 +1012,8 @@ impl<'a> Writer<'a> {
                     BinaryOperator::Divide if !is_float => {
                         Ok(atom(format!("quotient({}, {})", left.text, right.text)))
                     }
-                    // Each operation on numbers begins in a column of its own: by it tests tell where they plant a
-                    // mistake.
+                    // Each operation on numbers begins in a separate column, because tests name the places of planted
+                    // mistakes by line and column.
                     BinaryOperator::Add | BinaryOperator::Subtract if left.level == 15 => {
                         binary(op, is_float, atom(left.within(16)), right)
                     }

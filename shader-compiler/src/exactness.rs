@@ -11,14 +11,14 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-// The engine has it, too, and uses other parts of it.
+// The engine uses the same file, but other parts of it.
 #[allow(dead_code, unreachable_pub)]
 #[path = "../../src/shader/spirv.rs"]
 pub(crate) mod spirv;
 
 use spirv::{HEADER_WORDS, NO_CONTRACTION, SpirvError, instruction_word, instructions, op};
 
-// Further opcodes.
+// Opcodes that only the exactness pass needs.
 const NAME_LAST: [u16; 6] = [3, 4, 5, 6, 7, 330]; // OpSource … OpModuleProcessed
 const EXT_INST_IMPORT: u16 = 11;
 const EXT_INST: u16 = 12;
@@ -136,8 +136,8 @@ fn decorated(module: &[u32], converts: bool) -> Result<Vec<u32>, PassError> {
             (TYPE_FLOAT, &[_, _, bits, ..]) if bits != 32 && !(bits == 16 && converts) => {
                 return Err(PassError::FloatWidth { bits });
             }
-            // Every built-in function of GLSL.std.450 that naga would emit for our
-            // shaders is one of those that round freely.
+            // All built-in functions of GLSL.std.450 (EXT_INST) that naga would write for our shaders round freely, so
+            // they are refused.
             (F_CONVERT, _) if converts => {}
             _ if opcode == EXT_INST || INEXACT.contains(&opcode) => {
                 return Err(PassError::Inexact { word, opcode });
@@ -152,7 +152,7 @@ fn decorated(module: &[u32], converts: bool) -> Result<Vec<u32>, PassError> {
         .difference(&decorated)
         .flat_map(|&id| [instruction_word(op::DECORATE, 3), id, NO_CONTRACTION])
         .collect();
-    // Annotations come after the debug instructions and before the types.
+    // Annotations must follow the debug instructions and precede the types.
     let position = code
         .iter()
         .find(|i| !precedes_annotations(i.opcode))

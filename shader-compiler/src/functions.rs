@@ -350,7 +350,7 @@ impl Types<'_> {
                 let name = declared.name.clone().unwrap_or_default();
                 match (self.shared.contains(&name), numbers) {
                     (true, Numbers::One) => Ok(name),
-                    // Rust's struct has numbers of f32.
+                    // The struct in Rust has fields of f32, so a tuple is used for other numbers.
                     (true, Numbers::Any) => {
                         let fields: Result<Vec<String>> =
                             members.iter().map(|m| self.name(m.ty)).collect();
@@ -756,7 +756,7 @@ impl<'a> Writer<'a> {
             _ => false,
         };
         match self.function.named_expressions.get(&handle) {
-            // Bits have a name only as parts of an operation that is known as a whole.
+            // Bit patterns are only named inside groups of operations that are replaced as a whole.
             Some(_) if self.shape.numbers == Numbers::Any && !self.is_float(handle) => Ok(()),
             Some(name) => {
                 let value = self.whole(handle)?;
@@ -764,7 +764,7 @@ impl<'a> Writer<'a> {
                 self.named.insert(handle, name.clone());
                 Ok(())
             }
-            // A later store changes what is loaded.
+            // A later store may change the variable, so the loaded value needs a name.
             None if is_load => self.name(handle).map(|_| ()),
             None => Ok(()),
         }
@@ -1187,7 +1187,7 @@ impl<'a> Writer<'a> {
 
     /// The name of a number of 32 bits that stands in vectors: naga has replaced the constant by its value.
     fn name_of(&self, literal: Literal) -> Option<&'a str> {
-        // The bits of a magnitude are a constant of crowds by chance.
+        // 0x7fff_ffff, the bits of a magnitude, also happens to be a constant of crowds.
         let is_wide =
             matches!(literal, Literal::U32(value) if value > 0xffff && value != 0x7fff_ffff);
         let mut constants = self.module.constants.iter().map(|(_, constant)| constant);
@@ -1348,8 +1348,8 @@ pub(crate) fn binary(op: BinaryOperator, is_float: bool, left: Text, right: Text
         let text = format!("{}.{method}({})", left.within(ATOM), right.text);
         return Ok(atom(text));
     }
-    // An operand on the right keeps its parentheses, and with them the order of the operations. Different operators on
-    // bits are easier to read with parentheses.
+    // The right operand keeps its parentheses, so that the order of operations does not change. Mixed operators on bits
+    // also keep them, because they are easier to read.
     let inside = |operand: &Text| match (11..=14).contains(&level) && operand.level != level {
         true => UNARY,
         false => level,
@@ -1376,7 +1376,7 @@ fn prune(lines: &mut Vec<Line>) {
             lines.remove(i);
         }
     }
-    // A value that is returned at once needs no name.
+    // A value that is returned immediately needs no name.
     let count = lines.len();
     if let [.., Line::Let(name, value), Line::Other(last)] = &lines[..]
         && name == last

@@ -10,7 +10,7 @@ mod entries;
 #[allow(unreachable_pub)] // tests and fuzzing include it
 mod exactness;
 mod functions;
-// The engine's build script has it, too, and uses another part of it.
+// The engine's build script uses the same file, but another part of it.
 #[allow(dead_code)]
 #[path = "../../build/hashes.rs"]
 mod hashes;
@@ -132,7 +132,7 @@ fn compile() -> Files {
         .iter()
         .map(|(path, hash)| format!("{hash} {path}\n"))
         .collect();
-    // Written last: files of two runs that got mixed do not fit it.
+    // Written last, so that the list does not fit a mixture of files of two runs.
     files.push((hashes::LIST, list.into_bytes()));
     files
 }
@@ -308,10 +308,10 @@ impl Module {
         } = self;
         let options = spv::Options {
             lang_version: (1, 3), // what Vulkan 1.1 takes
-            // Loops here end: their bounds are data that the host wrote.
+            // All loops of the shaders end: the host has written their bounds.
             force_loop_bounding: false,
             flags: spv::WriterFlags::empty(),
-            // Memory that a workgroup shares is written before it is read.
+            // Memory that a workgroup shares is always written before it is read.
             use_storage_input_output_16: false,
             zero_initialize_workgroup_memory: spv::ZeroInitializeWorkgroupMemoryMode::None,
             ..spv::Options::default()

@@ -227,9 +227,9 @@ fn vectors<
     };
     let constant = L::all(segment.constant());
     let begun = S::begin::<L, PREFETCH>(constant, &mut parameters);
-    // A copy is loaded as a whole before the first sample is stored. That is faster for arcs, and for
-    // polynomials that come from memory, as those of long results do; of a polynomial in the caches
-    // each coefficient is better loaded where it is used.
+    // The constants are copied before the first sample is stored. This is faster for arcs, and for polynomials that
+    // come from memory, as in long results. If a polynomial is in the cache, loading each coefficient where it is used
+    // is faster.
     let copy;
     let is_copied = O::STREAMS || size_of::<S>() <= size_of::<ArcSegment>();
     let segment = match is_copied {
@@ -364,7 +364,7 @@ impl Sink for StreamingLines<'_> {
         let begun: &[L::Block] = bytemuck::cast_slice(slice::from_ref(&begun));
         let whole: &mut [L::Block] = bytemuck::cast_slice_mut(self.whole);
         let rest = bytemuck::cast_slice_mut(slice::from_mut(self.rest));
-        // From here on samples are counted in vectors.
+        // From here on, `count` and `made` are numbers of vectors.
         let (count, mut made) = (count.div_ceil(rotations), 0);
         while made < begun.len() {
             for (i, vector) in (made..).zip(vectors.next().as_ref()) {

@@ -113,7 +113,7 @@ pub(crate) fn arcs_between<L: Lanes>(
     }
     let rest = middles.len() - whole;
     if rest > 0 {
-        // The last vector is filled up with arcs that are left out.
+        // The unused lanes of the last vector get arcs that are discarded.
         let mut keys = [[[0.0; 4]; MAX_LANES]; 2];
         keys[0][..rest].copy_from_slice(&starts[whole..][..rest]);
         keys[1][..rest].copy_from_slice(&ends[whole..][..rest]);

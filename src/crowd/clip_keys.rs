@@ -77,7 +77,7 @@ fn packed_keys(curve: &ChannelCurve) -> Option<(u32, Vec<[f32; 4]>)> {
         let [middle, tangent] = *curve.constants_at(index) else {
             return None;
         };
-        // Each key has the sign that is nearer to the key before, as arcs have it.
+        // Each key gets the sign that is nearer to the key before, as for arcs.
         if dot(keys[index], keys[end]) < 0.0 {
             keys[end] = keys[end].map(|component| -component);
         }

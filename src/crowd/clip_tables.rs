@@ -95,7 +95,7 @@ fn curve(
                         scale: along.scale,
                         offset: along.offset,
                     };
-                    // The constants, power by power.
+                    // The constants, ordered by power.
                     let constants = match (form, index as usize) {
                         (FORM_ARC, index) => {
                             let arc = &prepared.segments.arcs[index];
@@ -197,7 +197,7 @@ impl ClipTables {
                 }
             }
         }
-        // Every curve has its constants and keys, and may have spans of its own.
+        // Every curve has constants and keys; it may also have its own spans.
         let constants = |curve: &ChannelCurve| curve.constants.len() + curve.keys.len();
         let more: usize = curves.iter().map(constants).sum();
         let spans: usize = curves.iter().map(|curve| curve.spans.len()).sum();
@@ -262,14 +262,14 @@ impl ClipTables {
         }
         let mut known: HashMap<Vec<u8>, u32> = HashMap::new();
         let mut last: Option<(&[CrowdSpan], u32)> = None;
-        // Channels of one kind, one form and one time base lie side by side.
+        // Channels with the same kind, form and time base are stored next to each other.
         let mut sides = BTreeMap::<_, Vec<(usize, &ChannelCurve)>>::new();
         for (index, curve) in curves.iter().enumerate() {
             let mut base = 0;
             if curve.form != FORM_CONSTANT {
                 let bytes: &[u8] = bytemuck::cast_slice(&curve.spans);
                 base = match last {
-                    // Usually all curves have the same spans.
+                    // Usually all curves of a clip have the same spans, so they are stored once.
                     Some((spans, base)) if bytes == bytemuck::cast_slice::<_, u8>(spans) => base,
                     _ => *known.entry(bytes.to_vec()).or_insert_with(|| {
                         self.push_base(&curve.spans);
@@ -282,7 +282,7 @@ impl ClipTables {
             sides.entry(side).or_default().push((index, curve));
         }
         if self.bases.len() == first_base {
-            // Every entry needs a time base, so there is always one.
+            // Every entry needs a time base, so a clip without spans gets an empty one.
             self.push_base(&[CrowdSpan::zeroed()]);
         }
         let first_channel = self.channels.len();
@@ -432,7 +432,7 @@ pub(crate) fn arcs<L: Lanes>(
     }
     let rest = output.len() - whole;
     if rest > 0 {
-        // The last vector is filled up with arcs that are left out.
+        // The unused lanes of the last vector get arcs that are discarded.
         let mut ends = [[[0.0; 4]; MAX_LANES]; 2];
         ends[0][..rest].copy_from_slice(&middles[whole..]);
         ends[1][..rest].copy_from_slice(&tangents[whole..]);

@@ -127,7 +127,7 @@ impl CrowdLayer {
             | mask << 24
             | wrap << 29
             | u32::from(self.blend == LayerBlend::Additive) << 31;
-        // The anchor lies up to 255 ticks before the clock; the layer has moved since.
+        // The anchor is up to 255 ticks before the clock. Meanwhile the layer has moved by this much.
         let moved = i64::from(units) * (clock & 0xff) as i64;
         let moved = if backwards { -moved } else { moved } >> 16;
         let mut start = folded(self.time.into(), wrap, clip.period) - moved;

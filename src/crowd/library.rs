@@ -95,7 +95,7 @@ impl CrowdLibrary {
         let mut offsets = vec![Vec3::ZERO; joints];
         let mut depths = vec![0u32; joints];
         let (mut links, mut levels) = (Vec::new(), vec![0]);
-        // Parents come before their children, and so does each level before the next.
+        // In this order, parents come before their children, and each level before the next.
         for link in skeleton.links() {
             let joint = link.track as usize;
             offsets[joint] = Vec3::from_array(link.offset.map(canonical));
@@ -226,7 +226,7 @@ impl CrowdLibrary {
         let (tracks, joints) = (set.track_count(), self.joint_count());
         let named = Joints::of(set);
         let order = match &self.joints {
-            // If both have names, the joint that is missing is named instead of the numbers.
+            // If both have names, the message names the missing joint instead of the numbers of joints.
             Some(known) if tracks == joints || (known.is_named() && named.is_named()) => {
                 known.order_of(&named, ["the library", "the clip"])?
             }
@@ -494,7 +494,7 @@ impl MotionBuilder {
         engine: &Engine,
         clips: &[MotionClip<'_>],
     ) -> Result<(), (usize, CrowdError)> {
-        // The first clip may name the joints.
+        // The first clip may name the joints, so it is added before the others.
         if let Some(first) = clips.first() {
             (self.0.push_clip(first)).map_err(|error| (0, error))?;
         }

@@ -641,7 +641,7 @@ fn guessed_position(
     let count = i64::from(base.count);
     let base_spans = &spans[base.first as usize..][..base.count as usize];
     let start = |index: i64| i64::from(base_spans[index as usize].start & TICKS);
-    // Spans in so many ticks, rounded away from 0.
+    // The number of spans in this many ticks, rounded away from 0.
     let spans_in = |ticks: i64| {
         let product = ticks * (count - 1);
         let period = i64::from(period).max(1);

@@ -259,7 +259,7 @@ pub(crate) fn quantity_value<R: Real>(
     };
     // ω = 2 q⁻¹ q', and its derivative is the vector part of 2 q⁻¹ q''.
     let [x, y, z, _] = step(at, derivative);
-    // No closure: those are not always inlined.
+    // Not a closure, because closures are not always inlined.
     let twice = R::all(2.0) * scale;
     let body = [clamped(twice * x), clamped(twice * y), clamped(twice * z)];
     let [x, y, z] = match axes {

@@ -106,7 +106,7 @@ impl Engine {
         let cache = Cache::new(&options.cache_files);
         let (mut models, mut timed) = (HashSet::new(), Vec::new());
         for device in Device::list().unwrap_or_default() {
-            // Cards of one model are equally fast: the first one is timed.
+            // Cards of one model are equally fast, so only the first one is measured.
             let Some(model) = model(&device).filter(|_| !device.is_software()) else {
                 continue;
             };
@@ -156,7 +156,7 @@ impl Engine {
             clip.evaluate_into(&SampleTimes::fps(1), Layout::TrackMajor, &mut output)?;
             Ok::<_, Error>(started.elapsed())
         };
-        // The first time does not count: caches are cold, and some drivers compile then.
+        // The first run does not count, because caches are cold and some drivers compile then.
         time()?;
         Ok(time()?.min(time()?).min(time()?))
     }

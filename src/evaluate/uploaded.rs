@@ -77,7 +77,7 @@ impl Uploaded {
             && let Some(kept) = limits.kept_segments
             && needed > kept.min(budget)
         {
-            // Where most intervals need a segment, a clip keeps all of them.
+            // If most intervals need a segment, keep the segments of all.
             let bytes = if needed > budget { budget } else { needed / 2 };
             if let Some(keys) = KeptKeys::new(set, interpolation, bytes)? {
                 return Ok(Self::Keys(Arc::new(keys)));

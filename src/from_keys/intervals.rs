@@ -249,7 +249,7 @@ impl InLanesInto<[[f32; 4]], [[f32; 4]]> for Arcs<'_> {
     fn run<L: Lanes>(&self, keys: &[[f32; 4]], output: &mut [[f32; 4]]) {
         let mut vectors = Vectors(&self.0.vectors, 0);
         while let Some(a) = vectors.next::<L>() {
-            // The last of an odd number is computed twice.
+            // The last vector of an odd number is computed twice.
             let b = vectors.next::<L>().unwrap_or(a);
             let from = Together::of_rotations(a.keys::<L>(1, keys), b.keys(1, keys));
             let to = Together::of_rotations(a.keys::<L>(2, keys), b.keys(2, keys));
@@ -437,8 +437,8 @@ mod tests {
         plain.map_or(KeyCurve::Arcs, |fast| KeyCurve::Cubics(fast.weights))
     }
 
-    /// Every width has the bits of segments, in any part of the frames; what the series does not hold is marked, and is
-    /// not much.
+    /// Every vector width has the bits of segments, in any part of the frames. Samples for which the series is not
+    /// exact enough are marked, and there are few of them.
     #[test]
     fn lanes_of_intervals_have_the_bits_of_segments() {
         let set = &motion(&mut Rng::with_seed(7));
@@ -513,7 +513,7 @@ mod tests {
                 let arrays = rotations.as_arrays().iter();
                 arrays.map(|rotation| rotation.map(f32::to_bits)).collect()
             };
-            // Keys, and a kept clip in both orders.
+            // Results from keys, and of a kept clip in both layouts.
             let of_keys = engine.evaluate(set, method, &frames).unwrap();
             assert!(bits(&of_keys) == expected, "{method} from keys");
             assert!(

@@ -148,7 +148,7 @@ impl KeptKeys {
             _ => {
                 for (tracks, values) in tracks.iter().zip(output.chunks_mut(L::COUNT)) {
                     store::<L>(self.on_cubics(at, tracks), values);
-                    // An unresolved value has four components of 0; one of them is quickly compared.
+                    // In an unresolved value all four components are 0. Comparing one is faster, and finds all of them.
                     if values.iter().any(|value| value[3] == 0.0) {
                         self.resolve(at, tracks, values);
                     }

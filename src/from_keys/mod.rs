@@ -56,7 +56,7 @@ impl KeyCurve {
 
     /// The curves of a set that can be evaluated from keys; cubics only where they have small angles.
     fn of_set(set: &TrackSet, interpolation: &Interpolation) -> Option<Self> {
-        // On the path as authored an arc may exceed half a turn; it is then two segments.
+        // With signs as authored, an arc may exceed half a turn. Then it is two segments, which this route does not have.
         let arcs_are_short = interpolation.signs == KeySigns::Shortest || set.arcs_are_short();
         if !arcs_are_short || !interpolation.wrap().are_held() {
             return None;

@@ -88,7 +88,7 @@ impl VulkanClip {
         if let Some(there) = there(&lock(&self.buffers)) {
             return Ok(there);
         }
-        // One caller at a time uploads, and nothing is locked while it does.
+        // Only one caller uploads at a time. No lock is held during the upload.
         let _uploading = self.uploading.take();
         let old = {
             let mut buffers = lock(&self.buffers);
@@ -136,7 +136,7 @@ impl MachineClip for VulkanClip {
     }
 
     fn replace(&mut self, data: ClipData) -> Result<(), EvaluateError> {
-        // The kept lists are for the old tracks.
+        // The kept lists belong to the old tracks.
         self.lists.forget();
         self.data = Arc::new(data);
         let old = lock(&self.buffers).take();
@@ -161,8 +161,8 @@ pub struct ClipTarget {
     bound: u64,
     /// The length of the result, bytes.
     bytes: u64,
-    // The descriptor sets refer to it. The caller guarantees that no work that uses it is in flight when the target
-    // is dropped.
+    // The descriptor sets refer to this buffer. The caller guarantees that no work that uses it is in flight when the
+    // target is dropped.
     _segments: Arc<ClipBuffers>,
 }
 
@@ -201,7 +201,7 @@ impl ClipTarget {
             bytes: whole.len() as u64 * each,
             _segments: Arc::clone(job.buffers),
         };
-        // Later recordings have memory for their steps.
+        // Record once now, so that later recordings need not allocate memory for their steps.
         target.fill(&mut lock(&target.work), 0);
         Ok(target)
     }

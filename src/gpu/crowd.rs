@@ -59,7 +59,7 @@ pub(crate) struct DeviceCrowd {
 impl CrowdTables {
     /// Copies the tables to the device.
     fn new(engine: &VulkanEngine, source: &CrowdSource<'_>) -> Result<Self, VulkanError> {
-        // After the links, the first and the last index of each level.
+        // The list of links, followed by the first and the last index of each level.
         let mut links = source.links.to_vec();
         links.extend(source.levels.windows(2).map(|level| CrowdLink {
             joint: level[0],
@@ -125,10 +125,10 @@ impl DeviceCrowd {
         let budget = self.engine.clip_bytes.map_or(range, |bytes| bytes as u64);
         let mut range = range.min(budget);
         if info.kind == DeviceKind::Cpu {
-            // Every kernel goes over a window while it is in the processor's cache.
+            // On software devices, windows are small, so that every kernel finds the window in the processor's cache.
             range = range.min(SOFTWARE_WINDOW);
         }
-        // Vectors are counted in 32 bits.
+        // The kernels count vectors in 32 bits.
         let limit = (range / bytes).min(u64::from(u32::MAX / 4) / (bytes / 8));
         let all = u64::from(self.tables.instances).next_multiple_of(LEAST_WINDOW);
         (limit / LEAST_WINDOW * LEAST_WINDOW).clamp(LEAST_WINDOW, all) as u32
@@ -186,7 +186,7 @@ impl CrowdTarget {
             buffers.push(buffer);
             Ok::<_, VulkanError>(resource)
         };
-        // No memory for positions if whole instances are evaluated.
+        // If whole instances are evaluated, no memory for positions is needed.
         let position_bytes = match kernels.whole {
             Some(_) => 0,
             None => shape.position_bytes(),
@@ -218,7 +218,7 @@ impl CrowdTarget {
         let windows = [window, room];
         let recording = &mut work.recording;
         let frames = Frames::new(recording, shape.clone(), kernels, resources, windows);
-        // Later frames have memory for their steps.
+        // Record once now, so that later frames need not allocate memory for their steps.
         frames.record(
             recording,
             &CrowdFrame {
@@ -315,7 +315,7 @@ impl MachineCrowd for VulkanCrowd {
 
 /// A target whose result the host reads: it is in host-visible memory, and a submission does not wait.
 struct CrowdReader {
-    // Dropped first: it waits for the work that uses the rest.
+    // Dropped first, because dropping it waits for the work that uses the other fields.
     results: KernelResults,
     target: CrowdTarget,
 }
@@ -459,7 +459,7 @@ mod tests {
         for crowd in crowd(Mapping::Samples, 129, 1, false) {
             assert_eq!(kernels(&crowd, skinning), steps("crowd_walk"));
         }
-        // As many time bases as there are joints.
+        // Skeletons with as many time bases as joints.
         for crowd in crowd(Mapping::Samples, 33, 4, true) {
             let [times, _, walk, skin, half] = steps("crowd_walk_all");
             let found = kernels(&crowd, skinning);

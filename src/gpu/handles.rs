@@ -167,7 +167,7 @@ fn usable_version(stated: u32, loader: u32) -> Option<u32> {
 /// use std::sync::{Arc, Mutex};
 /// use tumble::vulkan::QueueLock;
 ///
-/// let frames = Arc::new(Mutex::new(0)); // what the application's lock protects beside the queue
+/// let frames = Arc::new(Mutex::new(0)); // other data that the application's lock protects
 /// let shared = Arc::clone(&frames);
 /// let lock = QueueLock::new(move |submit| {
 ///     let _locked = shared.lock();

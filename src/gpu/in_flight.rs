@@ -25,7 +25,7 @@ use crate::work::recording::Resource;
 
 /// The resources of one piece of work in flight; `U` are its uploads.
 pub(crate) struct InFlight<U> {
-    // It goes first: it waits for its work to end before the buffers are freed.
+    // Dropped first, because it waits for its work before the buffers are freed.
     pub(crate) results: KernelResults,
     pub(crate) uploads: U,
     pub(crate) done: Option<Finish>,
@@ -147,7 +147,7 @@ impl<U> InFlight<U> {
     ) -> Result<(), VulkanError> {
         if let Some(mut spent) = self.results.wait()? {
             if self.kept.is_some() {
-                // The work may have ended long before this call.
+                // The work may have ended long before this call, so its start is computed from its time on the device.
                 spent.submitted = (spent.finished)
                     .checked_sub(spent.on_device)
                     .unwrap_or(spent.finished);
@@ -183,7 +183,7 @@ impl<U> InFlight<U> {
 /// Submitted kernels, and the memory through which their results come back. It must be dropped before other resources
 /// of the kernels.
 pub(crate) struct KernelResults {
-    // Kernels and copy go first: they wait for their end before the buffers are freed.
+    // Dropped first, because they wait for their work before the buffers are freed.
     pub(crate) kernels: Submission,
     apart: Option<CopyApart>,
     /// The buffer that kernels write.
@@ -271,8 +271,8 @@ impl KernelResults {
             copy_back(&mut kernels.work, result);
             return kernels.submit();
         };
-        // The semaphore orders the copy and makes the kernels' writes visible to it: there is no
-        // barrier in between, and none that the next kernels would wait for.
+        // The semaphore orders the copy and makes the kernels' writes visible to it. So no barrier is needed, for which
+        // the next kernels would have to wait.
         submission.begin()?;
         let result = submission.work.whole(output);
         copy_back(&mut submission.work, result);
@@ -315,7 +315,7 @@ fn grow<'b>(
     size: u64,
     residence: Residence,
 ) -> Result<&'b Buffer, VulkanError> {
-    // A shorter one is freed before the new one is made, so that both need not fit.
+    // A buffer that is too short is freed before the new one is allocated, so that memory for both is not needed.
     let buffer = kept.take().filter(|buffer| buffer.size >= size);
     let buffer = buffer.map_or_else(
         || Buffer::new(device, "tumble results", size, residence),

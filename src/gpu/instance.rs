@@ -46,7 +46,7 @@ impl Instance {
 
     /// As `new`, for an application that requests this version of Vulkan.
     pub(crate) fn of_version(validation: bool, api_version: u32) -> Result<Arc<Self>, VulkanError> {
-        // Loaders return these errors if they find no driver.
+        // The Vulkan loader returns these errors if it finds no driver.
         let is_absence = |error: &VulkanError| {
             matches!(error, VulkanError::Call { result, .. }
                 if *result == vk::Result::ERROR_INCOMPATIBLE_DRIVER)
@@ -75,7 +75,7 @@ impl Instance {
         let has_extension = |layer: Option<&CStr>, name: &CStr| -> Result<bool, VulkanError> {
             // SAFETY: the layer's name is a valid string.
             let found = unsafe { entry.enumerate_instance_extension_properties(layer) };
-            // Loaders return this if a driver's manifest (VK_DRIVER_FILES) is not valid JSON.
+            // The Vulkan loader returns this if a driver's manifest (VK_DRIVER_FILES) is not valid JSON.
             if found.as_ref().err() == Some(&vk::Result::ERROR_OUT_OF_HOST_MEMORY) {
                 return Err(VulkanError::NoDevice);
             }
@@ -86,7 +86,8 @@ impl Instance {
         let debug_utils = has_extension(None, ext::debug_utils::NAME)?
             || validation && has_extension(Some(VALIDATION), ext::debug_utils::NAME)?;
         let layers = [VALIDATION.as_ptr()];
-        // Loaders list drivers without all of Vulkan (MoltenVK) only with this extension and flag.
+        // The Vulkan loader lists drivers that do not support all of Vulkan (MoltenVK) only with this extension and
+        // flag.
         let portability = has_extension(None, khr::portability_enumeration::NAME)?;
         let extensions = [
             (debug_utils, ext::debug_utils::NAME),

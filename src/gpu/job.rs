@@ -295,7 +295,7 @@ impl ListCache {
         let asked = (request.timeline.clone(), whole.clone(), values_per_window);
         {
             let mut kept = lock(&self.0);
-            // Those of a device that was lost are of no use.
+            // Lists on a device that was lost cannot be used any more.
             (kept.lists).retain(|(_, lists)| Arc::ptr_eq(&lists.device, device));
             if let Some(index) = kept.lists.iter().position(|(known, _)| *known == asked) {
                 kept.lists[..=index].rotate_right(1);
@@ -306,7 +306,7 @@ impl ListCache {
                 return Ok(None);
             }
         }
-        // Made without a lock. If several callers make the same lists, those of the last are kept.
+        // Created without a lock. If several callers create the same lists, the last ones are kept.
         let made = match KeptLists::new(device, request, whole, values_per_window) {
             Err(EvaluateError::Vulkan(error)) if error.is_out_of_memory() => None,
             made => Some(Arc::new(made?)).filter(|made| made.bytes() <= MAX_BYTES),

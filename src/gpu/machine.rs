@@ -62,7 +62,7 @@ impl Machine for Opened {
                 let job = KeyJob { request, curve };
                 output.fill(|output| evaluate_from_keys(self, &job, output))
             }
-            // On these routes the host evaluates segments at once; uploading them would take longer.
+            // On these routes the host evaluates segments itself, because uploading them would take longer.
             Rows::SparseSamples | Rows::Batches { .. } => {
                 self.engine().host.rows(request, rows, output)
             }

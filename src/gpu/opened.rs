@@ -158,7 +158,7 @@ impl Opened {
                 Err(EvaluateError::Vulkan(error)) if error.is_out_of_memory() => {
                     let engine = self.engine();
                     engine.give_back();
-                    // If windows have their smallest size, another attempt would fail too.
+                    // If windows already have the smallest size, another attempt would fail too.
                     if !engine.halve_windows() {
                         return Err(error.into());
                     }

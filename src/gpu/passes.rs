@@ -175,13 +175,13 @@ impl PassTarget {
         };
         let mut bytes = size;
         if count > 0 {
-            // The inputs may just have been written, the result and the weights may still be read.
+            // Earlier work may still write the inputs, or read the result and the weights.
             parts.work.recording.wait_for_all();
         }
         const POSES: &str = "poses";
         let mut dispatches: Vec<([Option<Slice>; 4], [usize; 2])> = Vec::new();
         match job {
-            // Nothing is dispatched for 0 values.
+            // If there are no values, nothing is dispatched.
             _ if count == 0 => bytes = 0,
             PassJob::Blend(layers) => {
                 let input = parts.layers(layers, size)?;

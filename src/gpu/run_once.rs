@@ -53,7 +53,7 @@ fn run_over(
         found.bytes_mut(0..output.len()).copy_from_slice(output);
         found.flush(&(0..output.len()))?;
     }
-    // Made last: dropped first, it waits for its work before the buffers are freed.
+    // Created last, so that it is dropped first: it waits for its work before the buffers are freed.
     let mut submission = Submission::new(&pipeline.device, QueueLane::Kernels)?;
     submission.begin()?;
     let work = &mut submission.work;
@@ -61,7 +61,7 @@ fn run_over(
         .filter_map(|upload| Some(upload.copied_in(work)?.into()))
         .collect();
     let result = work.whole(&found);
-    // Kernels that store in one of two precisions have a binding for each.
+    // Kernels that store in one of two precisions have a binding for each. Both get the same buffer.
     bindings.resize(pipeline.kernel.compiled().bindings.len(), result.into());
     let set = work.recording.set(pipeline.kernel, bindings);
     work.recording.dispatch_with(set, constants, groups);

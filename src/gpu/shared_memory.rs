@@ -188,7 +188,7 @@ impl FreeRanges {
     fn give(&mut self, range: Range<u64>) {
         self.ranges.push(range);
         self.ranges.sort_by_key(|range| range.start);
-        // Free ranges that touch become one.
+        // Adjacent free ranges are merged.
         self.ranges.dedup_by(|next, merged| {
             let touches = merged.end == next.start;
             if touches {

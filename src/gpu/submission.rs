@@ -238,7 +238,7 @@ impl Submission {
 
 impl Drop for Submission {
     fn drop(&mut self) {
-        // An error may have left work pending; nothing may go before it ends.
+        // After an error, submitted work may not have ended. Nothing that it uses may be destroyed before.
         if self.wait().is_err() && self.submitted.is_some() && self.device.may_destroy() {
             self.device.wait_until_done(self.fence);
         }

@@ -36,7 +36,8 @@ impl Upload {
             .as_ref()
             .is_none_or(|buffer| buffer.size < size)
         {
-            // Shorter ones are freed before new ones are made, so that both need not fit.
+            // Buffers that are too short are freed before new ones are allocated, so that memory for both is not
+            // needed.
             (self.written, self.copied) = (None, None);
             let (written, is_staged) = writable(device, name, size, reads)?;
             if is_staged {

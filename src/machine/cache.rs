@@ -106,7 +106,7 @@ impl Cache {
 #[cfg(unix)]
 fn is_trusted(metadata: &fs::Metadata) -> bool {
     use std::os::unix::fs::MetadataExt as _;
-    // `/proc/self` belongs to root if the process must not be dumped, so its status is read instead.
+    // If the process must not be dumped, `/proc/self` belongs to root, so the owner is read from its status.
     let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
     is_private(metadata.uid(), metadata.mode(), effective_user(&status))
 }
@@ -131,7 +131,7 @@ fn is_trusted(_: &fs::Metadata) -> bool {
     true
 }
 
-/// A new file that others cannot write, whatever the mask of the process.
+/// Creates a file that other users cannot write, also if the umask of the process would allow it.
 fn private_file(path: &Path) -> std::io::Result<File> {
     let mut options = File::options();
     options.write(true).create_new(true);
@@ -154,7 +154,7 @@ fn folder(variable: impl Fn(&str) -> Option<OsString>) -> Option<PathBuf> {
     if let Some(named) = variable(VARIABLE) {
         return (!named.is_empty()).then(|| named.into());
     }
-    // Relative paths mean nothing here, as the XDG base directory specification says.
+    // The XDG base directory specification requires that relative paths are ignored.
     let absolute = |name: &str| {
         let path = PathBuf::from(variable(name)?);
         path.is_absolute().then_some(path)
@@ -257,7 +257,7 @@ mod tests {
             fs::set_permissions(&path, fs::Permissions::from_mode(mode)).unwrap();
             assert_eq!(cache.read("one", 100).is_some(), is_read, "{mode:o}");
         }
-        // Only the administrator may give a file away.
+        // Only root may change the owner of a file.
         if cfg!(target_os = "linux") && chown(&path, Some(54_321), None).is_ok() {
             assert_eq!(cache.read("one", 100), None);
             assert!(cache.write("one", b"again"), "it is replaced");

@@ -12,7 +12,7 @@
 //! callers ask for the device itself (`gpu::Opened::of`).
 
 pub(crate) mod cache;
-// The host evaluates its crowds without them.
+// On the CPU, crowds are evaluated without these.
 #[cfg_attr(not(feature = "vulkan"), allow(dead_code))]
 pub(crate) mod crowd;
 pub(crate) mod error;

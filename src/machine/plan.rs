@@ -227,8 +227,8 @@ impl Plan {
         let (route, chunks) = match stream {
             None => (Route::of(request, layout, limits), Chunks::Single),
             Some(stream) if has_rows(&stream) => (Route::of(request, layout, limits), Chunks::Each),
-            // A chunk has some samples of many tracks, or some of one track: every chunk needs segments that others
-            // need too, so all are prepared at once, unless that takes too much.
+            // A chunk has some samples of many tracks, or some of one track. So several chunks need the same segments.
+            // Therefore all segments are prepared at once, unless they need too much memory.
             Some(stream) => {
                 let limit = limits.memory.unwrap_or(SEGMENT_BYTES);
                 let chunks = match stream.segment_bytes <= limit {
@@ -321,7 +321,7 @@ impl Route {
                 }
             }
             (MachineKind::Device { window }, Some(curve)) => {
-                // Where samples are explicit times, the keys of a track are not cut.
+                // With explicit times, the keys of a track are not divided.
                 let longest = (request.set.longest()).max(request.samples.len());
                 match in_order || longest <= window {
                     true => Self::Rows(Rows::FromKeys(curve)),
@@ -447,7 +447,7 @@ impl fmt::Display for Route {
         f.write_str(match self {
             Self::Nothing => "no samples: nothing is computed",
             Self::Rows(Rows::FromKeys(KeyCurve::Arcs)) => {
-                "few samples between keys: each sample is computed from the two keys beside it"
+                "few samples between keys: each sample is computed from the keys before and after it"
             }
             Self::Rows(Rows::FromKeys(KeyCurve::TwoKeys)) => {
                 "fewer samples than keys, two keys per track: each sample is computed from the keys of its track"
@@ -698,7 +698,7 @@ mod tests {
                     ] {
                         for encoding in [Some(Encoding::F32), Some(Encoding::F16), euler] {
                             round += 1;
-                            // A device takes longer for each request.
+                            // Requests on a device take longer, so only some of them are tested.
                             if matches!(device, Device::Vulkan(_)) && round % 11 != 0 {
                                 continue;
                             }
@@ -723,7 +723,7 @@ mod tests {
                 }
             }
         }
-        // Every route was taken.
+        // Check that every route occurred.
         for (words, _) in STEPS {
             assert!(
                 texts.iter().any(|text| text.contains(words)),

@@ -228,8 +228,8 @@ const HALF_PI: [f64; 4] = [
     3.2820035428735005e-22,
 ];
 
-/// Sine and cosine, within 2e-16 up to 8e8 radians; for larger arguments those of another angle. Coefficients: fdlibm
-/// (Sun Microsystems, 1993), `k_sin.c` and `k_cos.c`.
+/// Sine and cosine, within 2e-16 for arguments of up to 8e8 radians. For larger arguments the results are wrong.
+/// Coefficients: fdlibm (Sun Microsystems, 1993), `k_sin.c` and `k_cos.c`.
 #[inline(always)]
 pub(crate) fn sine_cosine(x: f64) -> (f64, f64) {
     // The whole number nearest to x / (pi/2); its last bits are the quadrant.

@@ -55,7 +55,7 @@ impl Algebra for FullRange {
         log_near(q, near)
     }
 
-    // Not `near`, which is within 1e-12: a long tangent multiplies the error of a step's logarithm.
+    // Not by `near`, whose error is up to 1e-12: a long tangent multiplies the error of this logarithm.
     #[inline(always)]
     fn log_of_step(&mut self, step: Quaternion, _: Vector) -> Vector {
         log(step)

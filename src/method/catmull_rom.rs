@@ -37,8 +37,7 @@ impl HandleRule for CatmullRomRule {
         algebra: &mut A,
         [before, after]: BothSides<A>,
     ) -> HandlePair<A::Number> {
-        // The half-angle of both steps together may approach pi, so its sign is not changed to the
-        // nearer one.
+        // The half-angle of both steps together may be near pi, so the product keeps its sign.
         let two_step = product(before.step, after.step);
         let log = algebra.log_toward(two_step, sum(before.log, after.log));
         let handle = scaled(log, A::Number::all(1.0 / 6.0));

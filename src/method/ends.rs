@@ -50,7 +50,7 @@ fn set_handles<R: HandleRule>(intervals: &mut Intervals, stretches: &[TrackStret
         for (lane, end, is_first) in both {
             let Some(lane) = lane else { continue };
             let (log, step) = (at(&intervals.logs, lane), at(&intervals.steps, lane));
-            // The handle of the interval's inner key.
+            // The handle at the other key of the interval, which is inside the track.
             let other = if is_first {
                 at(&intervals.incoming, lane + 1)
             } else {

@@ -180,7 +180,7 @@ impl Interpolation {
                 .filter_map(of_track)
                 .collect()
         };
-        // Without threads it takes longer.
+        // If no threads can be started, the calling thread does all the work.
         on_threads(together).unwrap_or_else(|_| tracks.clone().filter_map(of_track).collect())
     }
 

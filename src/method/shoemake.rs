@@ -32,7 +32,7 @@ static CURVES: CurveKind = CurveKind::Smooth(SmoothCurves::new(
 pub(crate) struct Bisector<const DIVISOR: u8>;
 
 impl<const DIVISOR: u8> HandleRule for Bisector<DIVISOR> {
-    // These handles are 3/DIVISOR times as long as the parabola's, at inner keys too.
+    // At inner keys too, these handles are 3/DIVISOR times as long as those of a parabola.
     const HANDLE_SHARE: f64 = 2.0 / DIVISOR as f64;
 
     #[inline(always)]

@@ -50,7 +50,7 @@ impl OutputBuffer {
             && bytes >= LONG
             && let Ok(memory) = memmap2::MmapMut::map_anon(bytes)
         {
-            // If the system does not take the advice, pages are of the ordinary size.
+            // If the system does not follow this advice, pages have the ordinary size.
             let _ = memory.advise(memmap2::Advice::HugePage);
             return Ok(Self(BufferMemory::HugePages(memory)));
         }

@@ -36,7 +36,7 @@ impl ComponentType {
         match self {
             Self::F32 => bytemuck::pod_read_unaligned(bytes),
             Self::F16 => from_half(half()),
-            // -32768 means -1 too.
+            // -32768 also means -1, so the value is limited.
             Self::Snorm16 => (f32::from(half() as i16) / 32767.0).max(-1.0),
         }
     }
@@ -91,7 +91,7 @@ mod tests {
             let off = (f64::from(n) + 0.49) / 32767.0;
             assert_eq!(to_snorm(off as f32), u32::from(n as i16 as u16));
         }
-        // A component may pass 1 by rounding.
+        // Rounding may make a component slightly larger than 1.
         assert_eq!(to_snorm(1.000_000_4), 32767);
         assert_eq!(to_snorm(-1.000_000_4), u32::from(-32767i16 as u16));
     }

@@ -169,7 +169,7 @@ mod tests {
             let axis = DVec3::new((x * 0.7).sin(), (x * 1.3).cos(), (x * 0.4).sin());
             all.push(DQuat::from_axis_angle(axis.normalize(), x * 0.0031 - 6.2));
         }
-        // In gimbal lock, and next to it.
+        // Angles in gimbal lock, and close to it.
         for axis in AXES {
             for angle in [90.0, -90.0, 180.0, 90.001, 1e-4, 179.999] {
                 let rotation = DQuat::from_axis_angle(axis, f64::to_radians(angle));

@@ -35,7 +35,7 @@ pub fn continue_signs(rotations: &mut [Quat], tracks: usize) {
 pub fn signs_jump(rotations: &[Quat], tracks: usize) -> bool {
     let after = rotations.get(tracks..).unwrap_or_default();
     if tracks != 1 {
-        // No branch for each rotation, because lists are long and signs seldom change.
+        // The loop has no branch for each rotation, because lists are long and signs seldom change.
         let mut blocks = rotations.chunks(BLOCK).zip(after.chunks(BLOCK));
         return blocks.any(|(before, after)| jump(before, after));
     }

@@ -234,7 +234,7 @@ impl BodyOnPath {
         let normals: Vec<Option<Polynomial>> = (self.stretches.iter())
             .map(|part| self.normal(part))
             .collect();
-        // On straight parts, where the normal is undefined, the roll changes evenly over the length.
+        // On straight parts the normal is undefined. There the roll changes at a constant rate with the length.
         if normals.iter().any(Option::is_none) && self.timed_path.lengths.is_empty() {
             self.timed_path.measure();
         }
@@ -277,7 +277,7 @@ impl BodyOnPath {
                 let first = self.timed_path.lengths.at(start.interval, start.from);
                 let last = self.timed_path.lengths.at(arrival.interval, arrival.to);
                 points = match before {
-                    // A flip by 180° is removed, so that a roll of at most 90° remains.
+                    // If the roll would be more than 90°, the normal is reversed.
                     Some(_) => {
                         let half = std::f64::consts::PI;
                         let nearer = angle - half * (angle / half).round();
@@ -312,7 +312,7 @@ impl BodyOnPath {
         let offsets: [DVec3; 8] = std::array::from_fn(|i| {
             curve.at(stretch.from + (stretch.to - stretch.from) * (i + 1) as f64 / 8.0) - start
         });
-        // The line to the farthest point: the ends of a curve that comes back may be one point.
+        // A line from the start to the farthest point, because the ends of a closed curve may be one point.
         let farthest = |a: &&DVec3, b: &&DVec3| a.length().total_cmp(&b.length());
         let line = offsets.iter().max_by(farthest).copied();
         let line = line.unwrap_or_default().normalize_or_zero();
@@ -350,7 +350,7 @@ fn first_side(up: DVec3, direction: DVec3) -> DVec3 {
     if side.length() >= UPRIGHT {
         return side.normalize();
     }
-    // The axis that is farthest from it, x first.
+    // The axis with the largest angle to the direction; if several are equal, x comes first.
     let [x, y, z] = direction.abs().to_array();
     let axis = match x <= y && x <= z {
         true => DVec3::X,

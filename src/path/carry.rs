@@ -84,7 +84,7 @@ impl RelativePieces {
                 pieces.push(block.relative_piece(lane, range));
             }
         }
-        // Usually no stretch was cut, and they are in order already.
+        // Usually no stretch was divided, and the pieces are already sorted.
         pieces.sort_by(|a, b| {
             let by_start = a.piece.from.total_cmp(&b.piece.from);
             a.stretch.cmp(&b.stretch).then(by_start)

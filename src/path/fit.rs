@@ -92,7 +92,7 @@ pub(crate) fn fit(prepared: &mut Prepared, spans: &[Span], sampler: &mut Sampler
                 || counts[index] == MAX_PIECES
                 || middle <= span.from
                 || middle >= span.to;
-            // Times are rounded, and the rounding is a larger part of a shorter span.
+            // Times are rounded, and the rounding is relatively larger in short spans.
             let (start, end) = bodies[span.path as usize].timed_path.span();
             let hidden_error = TIME_ROUNDING * start.abs().max(end.abs()) / width;
             let source = if lanes.fits(lane, hidden_error) {

@@ -326,7 +326,7 @@ pub(crate) fn of_axes<R: Real>(x: [R; 3], z: [R; 3]) -> [R; 4] {
     let inverse = R::all(0.5) / square.root();
     let (xy, xz, yz) = (x[1] + y[0], x[2] + z[0], y[2] + z[1]);
     let (xw, yw, zw) = (y[2] - z[1], z[0] - x[2], x[1] - y[0]);
-    // Where z points down, x or y is largest, else z or w.
+    // If z points down, the largest component of the quaternion is x or y, otherwise z or w.
     let unscaled = [
         z[2].up_to(zero, rest.up_to(zero, square, xy), rest.up_to(zero, xz, xw)) * inverse,
         z[2].up_to(zero, rest.up_to(zero, xy, square), rest.up_to(zero, yz, yw)) * inverse,

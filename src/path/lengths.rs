@@ -134,7 +134,7 @@ impl Lengths {
 
 fn between(slope: &Polynomial, from: f64, to: f64) -> f64 {
     let tolerance = 1e-14 * slope.size();
-    // Where numbers overflow the sum is NaN, and halving would not end that.
+    // If numbers overflow, the sum is NaN. Then halving would never end.
     let differ = |whole: f64, sum: f64| (sum - whole).abs() > tolerance;
     integral(&speed(slope), from, to, MAX_HALVINGS, &differ)
 }

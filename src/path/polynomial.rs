@@ -61,7 +61,7 @@ impl Polynomial {
 
     /// A zero from 0 to 1: the least of the lengths at the ends and where they have a minimum.
     fn zero(&self, tolerance: f64) -> Option<f64> {
-        // Bernstein's coefficients that all lie on one side of a plane keep the curve there.
+        // If all Bernstein coefficients are on one side of a plane, the curve is on this side, too.
         let [c0, c1, c2, c3] = self.0;
         let control = [
             c0,

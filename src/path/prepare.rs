@@ -131,7 +131,7 @@ fn body_on(
     }
     let timed_path = TimedPath::new(path, follow);
     stop::check()?;
-    // A body that others face does itself face along its path.
+    // A body that other bodies face faces along its own path.
     let direction = match follow.direction {
         Direction::Track(target) if target == track => Direction::Tangent,
         direction => direction,
@@ -274,7 +274,7 @@ impl PathPreparation<'_> {
             let (track, times) = (self.first_track + path, &body.timed_path.times);
             if body.stretches.is_empty() || !is_fitted(body) {
                 match kind {
-                    // Positions at the times of the keys are cubics already.
+                    // With the times of the keys, positions are already cubics.
                     SampleKind::Vector => {
                         vectors::add(prepared, track, self.paths[path], &of_keys);
                     }
@@ -291,7 +291,7 @@ impl PathPreparation<'_> {
             let (spans, ends) = (&fitted_spans[first..next], &fitted.ends[first..next]);
             let (start, end) = body.timed_path.span();
             let last = used(body).len() - 1;
-            // Usually a span begins or ends there.
+            // Usually a span begins at the start or ends at the end. Its value is known then.
             let starts = |span: &&Span| span.stretch == 0 && span.from == start;
             let arrives = |span: &&Span| span.stretch as usize == last && span.to == end;
             let first_value = match spans.first().filter(starts) {

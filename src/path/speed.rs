@@ -26,7 +26,7 @@ impl PathSpeed {
             return part;
         };
         let top = 2.0 / (2.0 - start - end);
-        // In the middle the speed is constant.
+        // In the middle part, the speed is constant.
         let x = part / top + 0.5 * start;
         if x >= start && x <= 1.0 - end {
             return x;
@@ -35,7 +35,7 @@ impl PathSpeed {
             true => (0.0, start),
             false => (1.0 - end, 1.0),
         };
-        // Half of 2^-64 of the time is below the resolution of f64.
+        // After 64 steps the interval is 2^-64 of the time, which is below the resolution of f64.
         for _ in 0..64 {
             let middle = 0.5 * (low + high);
             if eased(start, end, middle) < part {

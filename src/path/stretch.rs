@@ -70,7 +70,7 @@ impl PathStretch {
         let to = timed_path.curves[interval].at(at) + leading * past_end
             - timed_path.curves[self.interval].at(t);
         if to.length() < 1e-6 * distance {
-            // Divided by its zeros, the slope has a direction where the curve stops too.
+            // Divided by its zeros, the slope also has a direction at points where the curve stops.
             let tangent = signed(
                 &timed_path.divided[self.interval],
                 0.5 * (self.from + self.to),

@@ -150,7 +150,7 @@ impl Engine {
                 |&sample: &usize| wrap.is_backwards((first, last), timeline, track, sample);
             for sample in (0..samples).filter(backwards) {
                 let vector = &mut vectors[layout.offset(track, sample, tracks, samples)];
-                // `-x` would change 0 to -0.
+                // Not `-x`, which would change 0 to -0.
                 *vector = vector.map(|x| 0.0 - x);
             }
         }

@@ -125,8 +125,8 @@ fn prepare(
             preparation.only_for(timeline, set);
         }
         let keys = match &batch {
-            // The number of segments is not known: only intervals with a sample are prepared. These lists are
-            // discarded, so nothing is reserved.
+            // Only intervals with a sample are prepared, so the number of segments is unknown. The lists are discarded
+            // afterwards, so nothing is reserved.
             Batch::Intervals { .. } if preparation.leaves_intervals_out() => 0,
             batch => batch.keys(set),
         };
@@ -370,7 +370,7 @@ impl ClipData {
             Ticks::Frames { .. } if all.len() > 2 && !samples.is_empty() => {
                 let first = timeline.time_at(track, samples.start);
                 let last = timeline.time_at(track, samples.end - 1);
-                // A part starts where the one before it ends.
+                // The start of a part is the end of the part before.
                 let end = |&index: &(u32, u32)| self.part(index).part.end;
                 let from = all.partition_point(|index| end(index) < first);
                 let to = all.partition_point(|index| end(index) <= last) + 1;

@@ -59,7 +59,7 @@ fn retime_track(
     let paced: Vec<(u32, IntervalCurve, ArcLengths)> =
         intervals.iter_mut().filter_map(paced).collect();
     if paced.is_empty() {
-        // The track does not move at all.
+        // The track does not move.
         let TrackPart {
             before, extension, ..
         } = &prepared.parts[part];
@@ -80,8 +80,8 @@ fn retime_track(
     let total: f64 = paced.iter().map(|(_, _, pace)| pace.total()).sum();
     let (end, count) = (prepared.parts[part].end, paced.len());
     let seconds = end - start;
-    // The first time of f64 at which the track has got so far, in seconds from its start: before it, the
-    // curve would be followed past its end.
+    // The first time in f64 at which the track has moved this far, in seconds from its start. At an earlier time, the
+    // curve would be evaluated past its end.
     let reached = |exact: f64| {
         let time = start + exact;
         let is_before = (exact - (time - start)) * (total / seconds) > VISIBLE;

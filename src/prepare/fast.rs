@@ -324,7 +324,7 @@ impl LeftOver {
         slots: &[CurveSlot],
     ) {
         let first = stretch.intervals.start + (lanes.start - stretch.lane);
-        // The only interval of a track has no neighbours.
+        // If a track has only one interval, there is no neighbouring interval in the lane before.
         let beside = usize::from(stretch.track_intervals > 1);
         self.stretches.push(TrackStretch {
             lane: self.intervals.count + beside,

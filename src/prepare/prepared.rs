@@ -185,7 +185,7 @@ impl Prepared {
                 ..part
             }));
         self.segments.arcs.extend(other.segments.arcs);
-        // The key's index has room: a buffer of a device has fewer keys.
+        // The index cannot overflow, because a device's buffer has fewer keys.
         let intervals = other.segments.intervals.into_iter();
         (self.segments.intervals).extend(intervals.map(|interval| interval + constants));
         let polynomials = other.segments.polynomials;

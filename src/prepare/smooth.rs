@@ -105,7 +105,7 @@ impl SmoothPreparation {
         ];
         let part = prepared.parts.len();
         prepared.push_part(index, track.times, &intervals, 0..0, held);
-        // A curve between two keys needs no keys beside them.
+        // A curve between two keys does not depend on neighbouring keys.
         let alone = all == 1 && self.interpolation.method.interpolates;
         let context = if alone { 0 } else { CONTEXT };
         let velocities = match self.smooth.input {

@@ -71,7 +71,8 @@ fn can_miss(keys: &[usize], key: usize, worst_of_each: &Worst<'_>) -> bool {
         .filter(|&k| k != key)
         .map(|k| keys[k])
         .collect();
-    // The ends of this part are not ends of the whole curve; the intervals there do not change.
+    // The ends of this part are not the ends of the whole curve. The intervals there do not change, so they are
+    // skipped.
     let skipped = usize::from(first > 0);
     let count = kept.len() - 1 - usize::from(end < keys.len());
     worst_of_each(&kept, skipped..count)
@@ -93,7 +94,7 @@ impl<T: Value> ReductionTask<'_, T> {
             for i in keys[interval] + 1..keys[interval + 1] {
                 let apart = self.samples[i].apart(curve(self.times[i]));
                 let part = match apart <= self.tolerance {
-                    // `min` also turns 0 / 0, which is NaN, into 1.
+                    // 0 / 0 is NaN; `min` turns it into 1.
                     true => (apart / self.tolerance).min(1.0),
                     // NaN counts as too far away.
                     false => (apart / self.tolerance).max(1.0).next_up(),

@@ -86,7 +86,7 @@ impl<T: Value> ReductionTask<'_, T> {
             let ends = start.numbers() * a + end.numbers() * c;
             T::nearest(ends + tangents[0] * b + tangents[1] * d)
         };
-        // A cubic could pass all samples and stray between them. Neighbours are always joined.
+        // A cubic could pass through all samples and deviate between them. Neighbouring samples are always connected.
         if is_cubic && to > from + 1 {
             for i in from..to {
                 // The difference between both shows how much is unknown between samples.

@@ -20,8 +20,8 @@ fn b_spline(track: &ReferenceTrack, ends: Ends, i: usize) -> Segment {
     let basis = Basis::Knots(knots(&track.times, ends, i));
     // The step beyond the first interval or, `at_end`, beyond the last.
     let outer_step = |at_end: bool| {
-        // The outermost interval, the next one, where the curve ends in the former, and which factor
-        // acts beyond it.
+        // The outermost interval, its neighbour, the parameter of the end, and the factor that belongs to the outer
+        // step.
         let (outermost, next, t, outer) = match at_end {
             false => (0, 1, 0.0, 0),
             true => (last, last.saturating_sub(1), 1.0, 2),

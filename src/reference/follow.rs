@@ -305,7 +305,7 @@ impl FollowerWalk<'_> {
                 .normalize_or_zero()
         };
         let steps = |i: usize, t: f64| {
-            // A little inside, as the second derivative jumps at keys and vanishes at inflections.
+            // Slightly inside the interval, because the second derivative jumps at keys and is 0 at inflections.
             let at = move |step: usize| (step as f64 + 1e-6) / STEPS as f64;
             (0..=step_at(t).0).map(move |step| (i, at(step)))
         };

@@ -189,7 +189,7 @@ pub(crate) const KOCHANEK_BARTELS: Definition = by_handles!(
         } = sides.tcb;
         let (before, after) = (sides.h_before, sides.h_after);
         let tight = 1.0 - tension;
-        // The names are those of Geier's documentation of `splines`.
+        // The names of the variables are those in Geier's documentation of the Python package `splines`.
         let a = tight * (1.0 + continuity) * (1.0 + bias);
         let b = tight * (1.0 - continuity) * (1.0 - bias);
         let c = tight * (1.0 - continuity) * (1.0 + bias);

@@ -178,7 +178,7 @@ impl VectorCurve {
             let [interval, second] = [0, 1].map(|j| if at_end { count - 1 - j } else { j });
             let [p, q, r] = [outer, inner, next].map(|key| self.keys[key]);
             if self.ends == Ends::Parabolic {
-                // The parabola through the last three keys, as far beyond as the last interval is.
+                // The parabola through the last three keys, continued by the length of the last interval.
                 let (a, b) = (self.step(interval), self.step(second));
                 let (x, y, z) = (0.0, a, a + b);
                 let at = -a;
@@ -202,7 +202,7 @@ impl VectorCurve {
             let (zero, one) = (off(DVec3::ZERO), off(DVec3::ONE));
             -zero / (one - zero)
         };
-        // Counted from the key before the first.
+        // Counted from the point before the first key.
         let point = |j: usize| match j {
             _ if self.ends == Ends::Loop => self.keys[(j + count - 1) % count],
             0 => outer_point(false),

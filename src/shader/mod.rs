@@ -6,7 +6,7 @@
 pub(crate) mod spirv;
 
 mod generated {
-    // The shaders write pi in two parts, and use constants that Rust has no use for.
+    // The shaders write pi in two parts, and have constants that Rust does not use.
     #![allow(dead_code, clippy::approx_constant)]
 
     use super::Access::{Read, ReadWrite, Write};

@@ -225,7 +225,7 @@ pub fn with_workgroup(module: &[u32], [from, to]: [u32; 2]) -> Result<Vec<u32>, 
     }
     let mut words = module[..HEADER_WORDS].to_vec();
     let mut bound = words[3];
-    // The new constants of the number of invocations and of lengths, by the old ones.
+    // New constants by old ones: the number of invocations, and the lengths of arrays.
     let (mut numbers, mut new_lengths) = (BTreeMap::new(), BTreeMap::new());
     let mut is_found = false;
     for instruction in &code {

@@ -54,7 +54,7 @@ macro_rules! doubles {
             Sub sub => Self($run!([$sub(x.0[0], y.0[0]), $sub(x.0[1], y.0[1])]));
             Mul mul => Self($run!([$mul(x.0[0], y.0[0]), $mul(x.0[1], y.0[1])]));
             Div div => Self($run!([$div(x.0[0], y.0[0]), $div(x.0[1], y.0[1])]));
-            // Compilers turn this into a change of the sign bit. Subtracting from +0 would not negate 0.
+            // Compilers turn this into a change of the sign bit. 0 - x would be wrong for 0: it gives +0.
             - => Self($run!([$sub($all(-0.0), x.0[0]), $sub($all(-0.0), x.0[1])]));
         }
 

@@ -221,8 +221,8 @@ impl Lanes for Sixteen {
 
     #[inline(always)]
     fn store_powers(powers: &[[Self; 4]], segments: &mut [PolynomialSegment], indices: &[usize]) {
-        // One store for four powers of a lane, a quarter as many. If the number of powers is not a
-        // multiple of four, the last store repeats some that are stored already.
+        // One store writes four powers of a lane. If the number of powers is not a multiple of four, the last store
+        // writes some powers a second time.
         for i in 0..powers.len().div_ceil(4) {
             let first = (4 * i).min(powers.len() - 4);
             let a = Self::transposed(powers[first]);

@@ -182,7 +182,7 @@ impl SmoothingBlock<'_> {
         let count = self.count + 2 * radius - 1;
         let rounded = count.next_multiple_of(BLOCK);
         for steps in self.steps.iter_mut() {
-            // Padding, because the last sums read as many steps as the others.
+            // Padding: the last sums read as many steps as the others.
             steps.resize(rounded + BLOCK, 0.0);
         }
         let before = self.first as isize - radius as isize;

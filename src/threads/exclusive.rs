@@ -17,7 +17,7 @@ pub(crate) struct Exclusive<T> {
 
 #[derive(Default)]
 struct ExclusiveState<T> {
-    /// The default value while it is taken.
+    /// The value; while a caller has taken it, the default value.
     value: T,
     is_lent: bool,
 }

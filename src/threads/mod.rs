@@ -5,7 +5,7 @@
 //! rayon's workers do, run other tasks of that pool while it waits, and such a task could need a lock that the
 //! waiting call or its caller has.
 
-// Devices alone have what one caller at a time uses.
+// Without the feature `vulkan`, nothing uses `exclusive`.
 #[cfg_attr(not(feature = "vulkan"), allow(dead_code))]
 pub(crate) mod exclusive;
 pub(crate) mod stop;

@@ -71,7 +71,7 @@ impl FrameRate {
     #[inline(always)]
     pub(crate) fn frames_in(self, seconds: f64) -> f64 {
         let frames = seconds * self.frames as f64;
-        // Most rates are whole numbers. The comparison saves a division, which would take longer than the rest.
+        // Most rates are whole numbers. The comparison avoids a division, which takes longer than the rest.
         if self.seconds == 1 {
             frames
         } else {
@@ -99,8 +99,7 @@ impl FrameRate {
     /// The time of frame `frame`, in seconds after frame 0.
     #[must_use]
     pub fn time_of(self, frame: u64) -> f64 {
-        // The product is exact for every count of frames that can be asked for at
-        // the usual rates.
+        // At usual rates, this product is exact for every possible number of frames.
         frame as f64 * self.seconds as f64 / self.frames as f64
     }
 }

@@ -193,7 +193,7 @@ impl Period {
         backwards: bool,
         (rate, start): (FrameRate, f64),
     ) -> f64 {
-        // A copy that runs backwards meets the first key where the next copy starts.
+        // If the copy runs backwards, it reaches the first key where the next copy begins.
         let number = if backwards { number + 1.0 } else { number };
         let time = Moment::between(start, self.first).plus(self.length.times(number));
         time.in_frames(rate)
@@ -235,7 +235,7 @@ mod tests {
                     let found = period.find(time, 0.0);
                     let (number, into) = (exact.div_euclid(length), exact.rem_euclid(length));
                     let off = found.into.seconds() - into as f64 / 1001.0 / f64::from(1 << 20);
-                    // If copies are not counted, they are shorter than a step of f64.
+                    // The number of copies is unknown if one copy is shorter than a step of f64.
                     let bound = 1e-15 * (last - first).max(found.number.map_or(1e3, |_| 0.0));
                     let whole = last - first;
                     assert!(

@@ -200,7 +200,7 @@ impl IntervalBlock {
     #[inline(always)]
     pub(crate) fn is_countable(&self, j: usize) -> bool {
         let distance = |sample: usize| (sample as f64 - self.whole[j]).abs();
-        // It is enough to look at the first sample and at the one after the last.
+        // Checking the first sample and the one after the last is enough, because the others are between them.
         distance(self.first[j]) < COUNTABLE && distance(self.first[j + 1]) < COUNTABLE
     }
 }
@@ -247,8 +247,8 @@ impl<'a> IntervalBlocks<'a> {
         if samples.start > 0
             && let Some(first_time) = clock.time_of_track(samples.start)
         {
-            // Most parts of a long track have no requested sample. To compare with the last start
-            // avoids a search through memory that is not in the caches.
+            // Most parts of a long track have no requested sample. Comparing with the last start avoids a search in
+            // memory that is not cached.
             let found = match starts.last() {
                 Some(&last) if last <= first_time => starts.len(),
                 _ => starts.partition_point(|&start| start <= first_time),

@@ -49,7 +49,8 @@ pub(crate) fn interval_at(starts: &[f64], time: f64, near: usize) -> usize {
     } else if contains(near + 1) {
         near + 1
     } else {
-        // Most keys are even: the interval in which the time is if all are. Rounding may give the one beside it.
+        // Most keys are at even times: compute the interval as if all were. Because of rounding it may be the
+        // neighbouring one.
         let guess = even_interval(starts, time);
         if contains(guess) {
             guess
@@ -70,7 +71,7 @@ fn even_interval(starts: &[f64], time: f64) -> usize {
     };
     let intervals = starts.len() - 1;
     let passed = (time - first) / (last - first) * intervals as f64;
-    // The cast takes what is not finite, and times outside, to the ends.
+    // The cast limits times outside and numbers that are not finite to the range.
     (passed as usize).min(intervals)
 }
 

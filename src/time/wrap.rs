@@ -168,7 +168,7 @@ impl Wrap {
         while sample < samples.end {
             let at_sample = next_position.take().unwrap_or_else(|| position(sample));
             let mut next = sample + 1;
-            // The next copy starts near here; the loops find its first sample by `position` alone.
+            // The next copy begins near this sample. The loops find its first sample by `position`.
             let end = match at_sample {
                 CopyPosition::At(_) => None,
                 CopyPosition::Track => {

@@ -431,7 +431,7 @@ fn numbers_of(names: &[String], numbering: Numbering) -> Option<Vec<usize>> {
     let number = |name: &String| {
         let digits = name.trim_start_matches(|c: char| !c.is_ascii_digit());
         let number: usize = digits.parse().ok()?;
-        // Numbers from 0 or from 1.
+        // Joints may be numbered from 0 or from 1.
         let indices = [Some(number), number.checked_sub(1)];
         let index = (indices.into_iter().flatten()).find(|&index| numbering(index) == *name)?;
         seen.insert(index).then_some(index)
@@ -451,7 +451,7 @@ fn are_near(name: &str, other: &str) -> bool {
         true => (name, other),
         false => (other, name),
     };
-    // Many names end in a name of one or two letters, so such short names are not suggested.
+    // Many names end in one or two letters that are also a name, so such short names are not suggested.
     long == short || short.len() > 2 && long.ends_with(&short)
 }
 
@@ -490,7 +490,7 @@ mod tests {
         let unnamed = |count: usize| Joints::named(vec![""; count]);
         assert_eq!(unnamed(2).order_of(&unnamed(2), LABELS).unwrap(), [0, 1]);
         refused(&unnamed(2), &unnamed(3), "b: 3 tracks; a has 2 joints");
-        // Formats that require names write these for joints without names.
+        // Formats that require names write these names for joints without names.
         let written = Joints::named(["box2", "box1"]);
         assert_eq!(unnamed(2).order_of(&written, LABELS).unwrap(), [1, 0]);
         let of_bvh = Joints::named(["joint0", "joint2", "joint1"]);
@@ -532,7 +532,7 @@ mod tests {
             &gap,
             "a has a joint `joint1`, b has none of that name",
         );
-        // Only exact numbers are numbers.
+        // Only numbers without leading zeros count as numbers.
         let padded = Joints::named(["joint00", "joint1"]);
         let text = "b has a joint `joint00`, but the joints of a have no names; name both, or neither to match them by \
                     index";
@@ -562,7 +562,7 @@ mod tests {
         assert!(all.extend(&twice, LABELS).is_err());
         assert_eq!((all.len(), all.by_name.len()), (4, 4));
         assert_eq!(all.parents.as_ref().map(Vec::len), Some(4));
-        // Joints without names are numbered as those before, and stay without names.
+        // Joints without names are numbered as before and get no names.
         let mut unnamed = Joints::named(["", ""]);
         let of_bvh = Joints::named(["joint2", "joint0", "joint1"]);
         assert_eq!(unnamed.extend(&of_bvh, LABELS).unwrap(), [2, 0, 1]);

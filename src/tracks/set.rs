@@ -90,7 +90,7 @@ impl TrackSet {
     /// Reserves memory for `tracks` more tracks with `keys` keys in total, if there is enough, so that the set does
     /// not grow step by step.
     pub fn reserve(&mut self, tracks: usize, keys: usize) {
-        // Where there is too little memory, pushing fails.
+        // If there is too little memory, `push` fails later and reports this.
         let _ = self.tracks.try_reserve(tracks);
         let _ = self.keys.try_reserve(keys);
     }
@@ -186,7 +186,7 @@ impl TrackSet {
         }
     }
 
-    /// Bytes of such a set.
+    /// The number of bytes of the keys, the times, the tracks and the signs.
     pub(crate) fn rotation_bytes(&self) -> usize {
         size_of_val(&self.keys[..])
             + size_of_val(&self.times[..])

@@ -18,7 +18,7 @@ pub(crate) fn in_parts(ticks: u32) -> u64 {
 /// x modulo q, for x below 2^63 and q from 1 on.
 #[inline(always)]
 pub(crate) fn wide_remainder(x: u64, q: u64) -> u64 {
-    // Usually less than a period has passed. The comparison saves a division, which would take longer than the rest.
+    // Usually less than a period has passed. The comparison avoids a division, which takes longer than the rest.
     if x < q { x } else { x % q }
 }
 

@@ -74,7 +74,7 @@ impl Evaluate for ArcSegment {
             arc_component(middle, tangent, s[3], f[3]),
         ];
         if FILTER {
-            // Written out: with a call of `lanes::canonical` SSE2 takes half as long again.
+            // Not by a call of `lanes::canonical`, which makes SSE2 take 1.5 times as long.
             quarters = [
                 quarters[0].canonical(),
                 quarters[1].canonical(),

@@ -35,7 +35,8 @@ impl Evaluate for PolynomialSegment {
 
     #[inline(always)]
     fn degree(&self) -> usize {
-        // As integers, so that no register of a vector is taken: coefficients are canonical, and none is -0.
+        // Compared as integers, so that no vector register is needed. This is exact, because coefficients are canonical
+        // and none is -0.
         let [.., seventh, eighth, ninth, tenth] = &self.coefficients;
         let bits = |c: &[f32; 4]| -> u64 {
             let [low, high]: [u64; 2] = bytemuck::cast(*c);

@@ -394,7 +394,7 @@ impl Memory {
         for invocation in &invocations {
             running.push(Box::pin(main(invocation)));
         }
-        // Each runs to its next barrier in turn.
+        // Each invocation runs to its next barrier, one after another.
         let mut context = Context::from_waker(Waker::noop());
         while !running.is_empty() {
             running.retain_mut(|invocation| invocation.as_mut().poll(&mut context).is_pending());
@@ -439,7 +439,7 @@ pub(crate) async fn shuffled<T: Stored>(machine: &impl Machine, value: T, lane: 
     T::of_words(&[found])
 }
 
-/// Waits until all lanes have seen what the others show, and shows nothing more.
+/// Waits until all lanes have read the values of the others, then removes the value of this lane.
 async fn hide(machine: &impl Machine) {
     barrier().await;
     machine.show(None);

@@ -31,7 +31,7 @@ pub(crate) struct Application {
     stamps: vk::QueryPool,
     /// Whether a wait timed out; then nothing may be destroyed.
     has_hung: bool,
-    // Destroyed last.
+    // The last field, so that it is destroyed last.
     instance: Arc<Instance>,
 }
 

@@ -296,7 +296,7 @@ impl fmt::Display for BufferComparison {
         if self.is_unwritten {
             return write!(
                 f,
-                "{kind}: none of {words} words was written: the kernel ran nowhere, or wrote to another buffer"
+                "{kind}: none of the {words} words was written: the kernel did not run, or it wrote to another buffer"
             );
         }
         write!(
@@ -323,7 +323,7 @@ impl fmt::Display for BufferComparison {
 /// The two buffers have different lengths, or do not contain whole words.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "{theirs} bytes are to be compared with {expected}, as words of {word} bytes; give both buffers the same length, in whole words"
+    "the buffers have {theirs} and {expected} bytes; give both the same length, a multiple of {word} bytes"
 )]
 #[non_exhaustive]
 pub struct BufferLengthError {

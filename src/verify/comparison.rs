@@ -136,7 +136,7 @@ impl std::fmt::Display for Comparison {
 /// # use glam::Quat;
 /// # let mut set = TrackSet::new();
 /// # set.push("", &[0.0, 1.0], &[Quat::IDENTITY, Quat::from_rotation_x(1.0)])?;
-/// // What a kernel of yours left in its buffer.
+/// // In place of this: read the buffer of your kernel.
 /// let theirs: Vec<[f32; 4]> = (0..=25)
 ///     .map(|frame| Quat::IDENTITY.slerp(Quat::from_rotation_x(1.0), frame as f32 / 25.0).into())
 ///     .collect();

@@ -241,7 +241,7 @@ impl Bench {
     ) {
         let (on_device, on_host) = seconds(runs);
         let seconds = match limit {
-            // The time on the bus counts until the host has the bytes.
+            // The time on the bus ends when the host has the bytes.
             "download" => on_host,
             _ => self.clocked((on_device, on_host)),
         };

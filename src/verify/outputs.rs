@@ -80,7 +80,7 @@ pub(crate) fn verify(
             max_error: rate_error(set, interpolation, timeline, &found)?,
             error_bound: match (interpolation.speed, quantity) {
                 (Speed::AsKeyed, _) => RATE_BOUND,
-                // At constant speed, the direction changes fast at times at which the keyed curve was slow.
+                // At constant speed, the direction changes fast where the keyed curve was slow.
                 (Speed::Constant, Quantity::Velocity(_)) => 1e-5,
                 (Speed::Constant, _) => 1e-3,
             },

@@ -178,7 +178,7 @@ fn set_round(
 ) -> Result<RandomRound, GoldenError> {
     let mut interpolation = interpolation(random);
     let (kind, set) = set(random);
-    // Curves that no polynomial fits are measured for each sample, on the host: seconds where they are wild.
+    // If no polynomial fits a curve, the host evaluates each sample in f64. For such sets this would take seconds.
     if !matches!(kind, "gentle" | "hour 24") {
         interpolation.speed = Speed::AsKeyed;
     }
@@ -220,7 +220,7 @@ fn set_round(
                 .encoding(encoding)
                 .evaluate_bytes();
         }
-        // Kept clips and sets in one go take different routes.
+        // A kept clip and an evaluation of the set take different routes.
         let bytes = match (is_rotation, keeps) {
             (true, true) => {
                 let clip = engine.upload(&set, interpolation)?;

@@ -199,7 +199,7 @@ pub(crate) fn record_in_row(
 
 /// Records a pass.
 fn record_pass(target: &PassTarget, commands: ash::vk::CommandBuffer) {
-    // Clips were evaluated into its inputs.
+    // The inputs are results of clips, which kernels wrote.
     let scopes = CommandScopes {
         before: CommandUsers::KernelsAndCopies,
         after: CommandUsers::Any,
@@ -301,14 +301,14 @@ fn buffer_to_buffer(
                         .encoding(encoding)
                         .evaluate_bytes()?;
                     let like = (layout, encoding);
-                    // A range that begins where no line does, and a record to an offset further on in it.
+                    // A range that does not begin at a cache line, and a recording with a larger offset in it.
                     let further = 3 * each;
                     let range = (&buffer, (offset - further) as u64);
                     let target = Renderer::clip_target(&clip, frames, like, range)?;
                     let recorded = renderer.application.recorded(false, |commands| {
                         record_clip(&target, commands, further as u64)
                     })?;
-                    // Samples that are listed anew, those that were kept from then on, and recorded ones.
+                    // Attempts with new lists, with kept lists, and with recorded commands.
                     for attempt in 0..4 {
                         match attempt {
                             0 | 1 => {
@@ -482,7 +482,7 @@ fn frames_in_flight(
                 let host = (renderer.application).buffer(size, ApplicationMemory::Host);
                 buffers.push((renderer.untouched(size)?, host.map_err(Error::from)?));
             }
-            // Made after the buffers that they lead to, and dropped before.
+            // Created after the buffers that they refer to, and dropped before them.
             let targets = (buffers.iter())
                 .map(|(buffer, _)| Renderer::target(&crowd, output, buffer))
                 .collect::<Result<Vec<_>, _>>()?;

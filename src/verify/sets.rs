@@ -99,7 +99,7 @@ pub(crate) fn random_set(
             };
             let mut quat = key(rotation, sign);
             if has_negated_keys && index % 7 == 5 {
-                // A component far below what f32 resolves beside the others.
+                // A component that is far too small to affect the others in f32.
                 quat = key(normalised([1e-30, 0.6, rotation[2], rotation[3]]), sign);
             }
             quats.push(quat);
@@ -352,7 +352,7 @@ pub(crate) fn crowd_library(
 ) -> Result<CrowdLibrary, CrowdError> {
     let mut library = CrowdLibrary::new(&skeleton(random, joints))?;
     for (index, &method) in methods.iter().enumerate() {
-        // A curve that turns too wildly for a crowd is refused, and leaves nothing behind.
+        // If a curve rotates too fast for a crowd, its clip is refused, and nothing of it stays in the library.
         while library.clip_count() == index {
             let set = joints_set(random, joints, 2 + 3 * index);
             match library.push(&set, method, VectorMethod::CatmullRom) {

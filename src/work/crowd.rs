@@ -92,7 +92,7 @@ pub(crate) struct FrameKernels {
 impl FrameKernels {
     pub(crate) fn new(shape: &CrowdShape, output: CrowdOutput, device: &CrowdDevice<'_>) -> Self {
         let arguments = &shape.arguments;
-        // One layer of arcs.
+        // There is only one layer, and it has only arcs.
         let is_plain = arguments.layers == 1 && shape.only_arcs;
         let whole = WholeKernel::new(arguments, output, is_plain, device);
         let walks_at_once = device.maps_samples && arguments.joints <= MAX_WALKED;
@@ -237,7 +237,7 @@ impl Frames {
     /// Records a frame with at most as many instances as there is room for: the changes that the device does not know
     /// yet, then the dispatches. The inputs of the recording are [`inputs`].
     pub(crate) fn record(&self, recording: &mut Recording, frame: &CrowdFrame<'_>) {
-        // Evaluations before this one may use the crowd's buffers, and anything the result's.
+        // Earlier evaluations may still use the crowd's buffers, and any work may use the result's buffer.
         recording.wait_for_all();
         self.record_changes(recording, frame);
         let arguments = CrowdDispatch {
@@ -482,7 +482,7 @@ mod tests {
     fn each_step_waits_for_what_it_reads() {
         let half = CrowdOutput::half(CrowdValues::Skinning);
         let unchanged = || frame(EntryChanges::None, VisibleInstances::All);
-        // The next window needs no barrier of its own: positions were read before a later step waited.
+        // No further barrier is needed before the next window: the positions were read before a later step waited.
         let window = "D|D|D|D|D|D";
         let expected = format!("^{window}{window}[Kernel>Any]");
         assert_eq!(steps(half, false, &unchanged()), expected);

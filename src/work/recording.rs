@@ -169,7 +169,7 @@ struct Uses {
 }
 
 impl Uses {
-    /// The last steps that another use needs.
+    /// The last steps for which another use of the resource must wait.
     fn before(&self, by: By, access: Access) -> Last {
         let mut writes = self.writes;
         match access {
@@ -438,7 +438,7 @@ pub(crate) mod tests {
         dispatch(&mut all, Kernel::CrowdWalk, &[links, matrices]);
         dispatch(&mut all, Kernel::CrowdHalf, &[local, matrices]);
         dispatch(&mut all, Kernel::CrowdHalf, &[local, matrices]);
-        // The values that were read are overwritten.
+        // The step overwrites values that an earlier step reads.
         dispatch(&mut all, Kernel::CrowdHalf, &[matrices, local]);
         let order = "[Kernel>Kernel]";
         assert_eq!(

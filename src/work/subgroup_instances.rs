@@ -63,7 +63,7 @@ impl SubgroupInstances {
             clock_high: arguments.clock_high,
             instances_log2,
             positions_log2: positions.ilog2(),
-            // Every `positions`th bit.
+            // A mask in which every bit at a multiple of `positions` is set.
             position_lanes: u32::MAX / ((1 << positions) - 1),
             joint_share: (1u32 << SHARE_BITS).div_ceil(arguments.joints),
         }
@@ -97,7 +97,7 @@ mod tests {
         assert_eq!(instances(64, 4), Some(1));
         assert_eq!(instances(256, 1), Some(4));
         assert_eq!(instances(512, 1), Some(2));
-        // They end within a line, there are too many positions or too many joints.
+        // Refused: joints that end within a line, too many time bases, and too many joints.
         assert_eq!(instances(21, 1), None);
         assert_eq!(instances(60, 3), None);
         assert_eq!(instances(64, 5), None);

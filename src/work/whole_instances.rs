@@ -7,7 +7,7 @@ use crate::shader::{
     MAX_WHOLE_JOINTS, MAX_WHOLE_POSITIONS,
 };
 
-// Every Vulkan device has so much memory for a workgroup, and so many invocations in one.
+// Every Vulkan device has this much memory for a workgroup, and this many invocations in one.
 const _: () = {
     let positions = MAX_WHOLE_POSITIONS as usize * size_of::<CrowdPosition>();
     let rows = 3 * MAX_WHOLE_JOINTS as usize * size_of::<[f32; 4]>();
@@ -39,8 +39,8 @@ impl WholeInstances {
         } = *arguments;
         let is_rotations = output.values == CrowdValues::Rotations;
         let room = (MAX_WHOLE_JOINTS / joints).min(MAX_WHOLE_POSITIONS / (layers * bases));
-        // How often a workgroup goes over its joints. Rotations are stored as they are evaluated, by invocations that
-        // may begin anywhere in a line, those before it being idle.
+        // The number of iterations of a workgroup over its joints. Rotations are stored immediately. They may begin
+        // within a line; then the invocations before them are idle.
         let line = LINE_VECTORS << u32::from(output.is_half);
         let rounds = |instances: u32| {
             let joints = instances * joints;
@@ -128,7 +128,7 @@ mod tests {
             assert_eq!(instances(joints, [1, 1], matrices), Some(of_matrices));
             assert_eq!(instances(joints, [1, 1], rotations), Some(of_rotations));
         }
-        // In half precision a line has twice as many, and 20 × 6 end in the middle of one.
+        // In half precision, a line has twice as many values, and 20 × 6 values end within a line.
         let half = CrowdOutput::half(CrowdValues::Rotations);
         assert_eq!(instances(20, [1, 1], half), Some(5));
     }

@@ -14,7 +14,7 @@ use super::compile::{divisions, listings, representations, statistics};
 use super::table::{self, Cost};
 use super::{unpacked, with_driver};
 
-/// The head of the table of docs/gpu.md with the cost of a store on NVIDIA's processors, kernel by kernel.
+/// The head of the table of docs/gpu-compilers.md with the cost of a store on NVIDIA's processors, kernel by kernel.
 const TABLE: &str = "| kernel | ga102 |";
 
 /// Processors: the table's name, and the number by which the layer knows it.
@@ -385,7 +385,7 @@ fn compiled(
         .collect()
 }
 
-/// The head of the table of docs/gpu.md with what is predicted for cards.
+/// The head of the table of docs/gpu-compilers.md with what is predicted for cards.
 const PREDICTIONS: &str = "| kernel | of 48 | of 200 |";
 
 /// A kernel over spread runs: the parts of a value and its bytes, and the most instructions that a sample of a run of

@@ -43,7 +43,7 @@ const FAMILIES: [Family; 6] = [
     family("gfx1201", None, Generation::Rdna),
 ];
 
-/// The head of the table of docs/gpu.md with the cost of a rotation on AMD's processors, kernel by kernel.
+/// The head of the table of docs/gpu-compilers.md with the cost of a rotation on AMD's processors, kernel by kernel.
 const TABLE: &str = "| kernel | polaris10 |";
 
 /// A processor with so many vector registers for an invocation keeps at least a quarter of the

@@ -1,4 +1,4 @@
-//! The tables of `docs/gpu.md`: the costs of kernels on processors of AMD's and NVIDIA's, one by one.
+//! The tables of `docs/gpu-compilers.md`: the costs of kernels on processors of AMD's and NVIDIA's, one by one.
 //! `UPDATE_LISTINGS=1 cargo test --test all mesa::` writes the measured numbers into their cells.
 
 use std::collections::BTreeMap;
@@ -18,7 +18,7 @@ pub(super) struct Cost {
 static PAGE: Mutex<()> = Mutex::new(());
 
 fn page() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/gpu.md")
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/gpu-compilers.md")
 }
 
 fn cells(line: &str) -> Vec<&str> {
@@ -43,7 +43,7 @@ pub(super) fn check(head: &str, measured: &BTreeMap<(String, &str), Cost>) -> Ve
     let text = std::fs::read_to_string(page()).unwrap();
     let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
     let head = lines.iter().position(|line| line.starts_with(head));
-    let head = head.expect("docs/gpu.md has the table");
+    let head = head.expect("docs/gpu-compilers.md has the table");
     let families: Vec<String> = cells(&lines[head])
         .iter()
         .skip(1)
@@ -59,17 +59,24 @@ pub(super) fn check(head: &str, measured: &BTreeMap<(String, &str), Cost>) -> Ve
         let mut row = format!("| `{kernel}` |");
         for (family, documented) in families.iter().zip(&documented[1..]) {
             let Some(&found) = measured.get(&(kernel.clone(), family)) else {
-                wrong.push(format!("docs/gpu.md: there is no {kernel} for {family}"));
+                wrong.push(format!(
+                    "docs/gpu-compilers.md: there is no {kernel} for {family}"
+                ));
                 continue;
             };
             row += &format!(" {}, {} |", found.instructions, found.registers);
             if let Some(why) = differs(documented, found) {
-                wrong.push(format!("docs/gpu.md: {kernel} for {family}: {why}"));
+                wrong.push(format!(
+                    "docs/gpu-compilers.md: {kernel} for {family}: {why}"
+                ));
             }
         }
         *line = row;
     }
-    assert!(rows >= 8, "the table of docs/gpu.md has {rows} rows");
+    assert!(
+        rows >= 8,
+        "the table of docs/gpu-compilers.md has {rows} rows"
+    );
     if std::env::var_os("UPDATE_LISTINGS").is_some() {
         std::fs::write(page(), lines.join("\n") + "\n").unwrap();
         return Vec::new();
@@ -84,14 +91,17 @@ pub(super) fn check_rows(head: &str, measured: &BTreeMap<&str, Vec<String>>) -> 
     let text = std::fs::read_to_string(page()).unwrap();
     let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
     let first = lines.iter().position(|line| line.starts_with(head));
-    let first = first.expect("docs/gpu.md has the table") + 2;
+    let first = first.expect("docs/gpu-compilers.md has the table") + 2;
     let (mut wrong, mut rows) = (Vec::new(), 0);
     let rows_of_table = lines[first..].iter_mut();
     for line in rows_of_table.take_while(|line| line.starts_with('|')) {
         rows += 1;
         let documented: Vec<String> = cells(line).iter().map(ToString::to_string).collect();
         let Some(found) = measured.get(&*documented[0]) else {
-            wrong.push(format!("docs/gpu.md: {} is not measured", documented[0]));
+            wrong.push(format!(
+                "docs/gpu-compilers.md: {} is not measured",
+                documented[0]
+            ));
             continue;
         };
         let (compared, others) = documented[1..].split_at(found.len());
@@ -102,7 +112,7 @@ pub(super) fn check_rows(head: &str, measured: &BTreeMap<&str, Vec<String>>) -> 
         if !compared.iter().zip(found).all(is_near) {
             let name = &documented[0];
             wrong.push(format!(
-                "docs/gpu.md: {name} has {compared:?}, not {found:?}"
+                "docs/gpu-compilers.md: {name} has {compared:?}, not {found:?}"
             ));
         }
         let cells = [&found[..], others].concat().join(" | ");

@@ -42,7 +42,7 @@ unsafe fn vectors<'a, T: Number>(
     output: *mut T,
     count: usize,
 ) -> Result<&'a mut [[T; 4]], Failure> {
-    // Other instances may be visible now than when it was submitted.
+    // Use the number of the submission: the list of visible instances may have changed since.
     let needed = 4 * crowd.submitted_len().unwrap_or(crowd.output_len(values));
     if count != needed {
         let (joints, each) = (crowd.library().joint_count(), 4 * values.vector_count());

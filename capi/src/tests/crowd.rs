@@ -569,7 +569,7 @@ fn sets_are_matched_to_the_joints_by_name() {
         unsafe { CStr::from_ptr(name) }.to_str().unwrap()
     };
     assert_eq!([0, 1, 2, 3].map(name), [""; 4]);
-    // The first set names the joints, whose order it has; the second has its tracks in another one.
+    // The first set determines the joints and their order; the second has its tracks in another order.
     let shuffled = named(&second, NAMES).select(order).unwrap();
     for tracks in [&named(&first, NAMES), &shuffled] {
         let set = c_set(tracks);

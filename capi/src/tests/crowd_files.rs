@@ -240,7 +240,7 @@ fn clips_of_a_file_that_move_different_joints_share_a_library() {
     }
     same(library, &rust_library);
 
-    // Another rig's clip has joints of other names, and one of an array none.
+    // A clip of another rig has other joint names; a clip made of arrays has none.
     let bvh = "HIERARCHY\nROOT pelvis\n{\nOFFSET 0 3 0\nCHANNELS 6 Xposition Yposition Zposition \
                Zrotation Xrotation Yrotation\nJOINT head\n{\nOFFSET 0 1 0\nCHANNELS 3 Zrotation \
                Xrotation Yrotation\nEnd Site\n{\nOFFSET 0 1 0\n}\n}\n}\nMOTION\nFrames: 3\n\
@@ -255,7 +255,7 @@ fn clips_of_a_file_that_move_different_joints_share_a_library() {
     let (arrays, _) = libraries();
     let pushed = push_clip(arrays, other, 0, null(), None);
     fails(pushed, TumbleResult::InvalidInput, "clip 0 has a joint");
-    // On its own it plays as the file says.
+    // In a library of its own, it plays as the file states.
     let of_other = library_of(other);
     done(push_clip(of_other, other, 0, null(), None));
     same(

@@ -269,7 +269,7 @@ fn results_and_states_are_checked() {
     }
     done(tumble_crowd_free(crowd));
 
-    // Without inverse bind matrices there is nothing to skin with.
+    // Skinning matrices need inverse bind matrices.
     let (mut library, engine, set) = (null_mut(), cpu(), one_track());
     // SAFETY: one number, and room for the handle.
     done(unsafe { tumble_crowd_library_new([-1].as_ptr(), null(), 1, 0, &raw mut library) });
@@ -435,7 +435,7 @@ fn weights_fades_and_lists_are_checked() {
         fails(
             tumble_crowd_set_visible(crowd, list.as_ptr(), 3),
             argument,
-            "instance 1 is in the list again, at 2",
+            "instance 1 is in the list twice, again at 2",
         );
         fails(
             tumble_crowd_set_visible(crowd, list[3..].as_ptr(), 1),

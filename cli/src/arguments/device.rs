@@ -97,7 +97,7 @@ const MIN_GPU_ROTATIONS: usize = 1 << 20;
 /// The devices of jobs whose size decides.
 struct ByCost {
     cpu: Engine,
-    /// For large jobs; found when there is one.
+    /// The engine for large jobs, which is opened when the first large job comes.
     large: Option<Engine>,
     options: EngineOptions,
 }
@@ -408,7 +408,7 @@ pub(crate) fn is_absence(error: &VulkanError) -> bool {
         | VulkanError::NoNvidiaDriver
         | VulkanError::SlowDriver { .. }
         | VulkanError::Driver { .. } => true,
-        // Loaders return this when no driver works.
+        // The Vulkan loader returns this if no driver works.
         VulkanError::Call { result, .. } => *result == vk::Result::ERROR_INITIALIZATION_FAILED,
         _ => false,
     }

@@ -340,7 +340,7 @@ impl UnreadFiles {
 
     fn add(&mut self, path: &Path) {
         let name = path.file_name().unwrap_or_default();
-        // Skip the manifest of a directory of results: it is not an input.
+        // In a directory of results, the manifest is not an input.
         if name == entry::NAME {
             return;
         }
@@ -549,7 +549,7 @@ impl GatheredInputs {
             let expansion = gathered.expand(path, selection, &exclusions);
             excluded += expansion.excluded;
             for mut found in expansion.found {
-                // The results of a list keep its tree.
+                // The results of a list have the same directory tree as the list.
                 if is_listed && let Some(below) = plain(&found.path) {
                     found.below = below;
                 }
@@ -644,7 +644,7 @@ impl GatheredInputs {
                 false => 0,
             };
             if found.is_empty() && excluded == 0 {
-                // Opening it reports the error.
+                // The error is reported when the file is opened.
                 return Expansion {
                     found: alone(),
                     excluded,
@@ -758,7 +758,7 @@ fn unreadable(error: &walkdir::Error) -> UnreadableEntry {
     if let Some(ancestor) = error.loop_ancestor() {
         let ancestor = ancestor.display();
         return UnreadableEntry::Skipped(format!(
-            "is a link to {ancestor}, a directory that it is in; not followed"
+            "is a link to {ancestor}, the directory that contains it; not followed"
         ));
     }
     let Some(path) = error.path() else {
@@ -774,7 +774,7 @@ fn unreadable(error: &walkdir::Error) -> UnreadableEntry {
         Some(io::ErrorKind::NotFound | io::ErrorKind::PermissionDenied) | None => {
             UnreadableEntry::Input
         }
-        // Links that lead to each other.
+        // Two links that lead to each other.
         Some(_) if is_link => {
             UnreadableEntry::Skipped("is a link in a circle of links; not followed".to_owned())
         }

@@ -117,8 +117,8 @@ impl InterpolationArguments {
         let has_tangents = clip.set.tracks().all(|track| !track.tangents.is_empty());
         if self.signs.is_some() && has_tangents && !methods.iter().any(takes) {
             return Err(format!(
-                "--signs has no effect on {} between keys with tangents, which belong to the signs of the \
-                 keys; leave it out",
+                "--signs has no effect on {}: the keys have tangents, which depend on the stored signs; leave \
+                 it out",
                 names_of(methods)
             ));
         }

@@ -309,7 +309,7 @@ pub(crate) fn with_present_names(text: &str) -> Cow<'_, str> {
             (Some((name, value)), _) if is_option(name) => {
                 options.push((name.to_owned(), value.to_owned()));
             }
-            // A value with a blank.
+            // The value contained a blank, so it was divided.
             (_, Some((_, value))) => *value += &format!(" {word}"),
             (_, None) => command = word.to_owned(),
         }
@@ -634,7 +634,7 @@ impl clap::FromArgMatches for CommandLine {
     fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
         let mut command_line = Self::default();
         for id in matches.ids().map(clap::Id::as_str) {
-            // Groups of options are called after their structs.
+            // The ids of argument groups are the names of their structs, which begin with a capital letter.
             if id.starts_with(char::is_uppercase) || GLOBAL.contains(&id) {
                 continue;
             }

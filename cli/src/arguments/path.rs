@@ -50,13 +50,13 @@ pub(crate) struct PathArguments {
         value_parser = frame()
     )]
     path_frames: Vec<PathFrame>,
-    /// The upward direction: at the start of minimal frames, everywhere of fixed ones
+    /// The upward direction: at the start for minimal frames, everywhere for fixed ones
     #[arg(long, value_name = "X,Y,Z", default_value = "0,1,0", value_parser = vector, allow_hyphen_values = true)]
     path_up: DVec3,
     /// Ignore the upward directions of a file (ux, uy, uz): only minimal frames use them
     #[arg(long)]
     no_ups: bool,
-    /// What to do with the rotation about the direction that is left over at the end of a closed path
+    /// What to do with the remaining rotation about the direction at the end of a closed path
     #[arg(long, value_name = "TWIST", default_value_t, value_parser = twist())]
     twist: Twist,
     /// The speed along the curve: as-keyed, constant, or eased:A,B, which speeds up over the fraction A of the

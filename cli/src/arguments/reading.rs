@@ -47,7 +47,7 @@ pub(crate) struct ReadingArguments {
     /// The key times of files without times (KITTI): a file of seconds, one line for each pose
     #[arg(long, value_name = "FILE", conflicts_with_all = ["source_fps", "override_fps"])]
     source_times: Option<PathBuf>,
-    /// The contents of arrays or columns whose names do not say it, such as rotations=keys:wxyz,time=t
+    /// The meaning of arrays or columns whose names are not known, such as rotations=keys:wxyz,time=t
     #[arg(long, value_name = "MAP")]
     map: Option<String>,
     /// The unit of times that are whole numbers
@@ -57,20 +57,20 @@ pub(crate) struct ReadingArguments {
     /// do not follow their format
     #[arg(long, value_name = "ORDER", value_parser = component_order())]
     source_order: Option<ComponentOrder>,
-    /// Skip keys with missing numbers in tables, trajectories and logs (blank cells, nulls, NaN): the
-    /// track is interpolated from the keys beside them
+    /// Skip keys with missing numbers in tables, trajectories and logs (blank cells, nulls, NaN): the track is
+    /// interpolated between the keys before and after them
     #[arg(long)]
     bridge_gaps: bool,
     /// FBX: read only the file's keys, instead of adding keys that follow its curves [default: only if
     /// `eval -m` names a method]
     #[arg(long)]
     keyframes: bool,
-    /// The robot that moves, MJCF or URDF: its joints' names and limits, and the order of bodies, are
-    /// taken from it, and checked with the bodies of the input
+    /// The robot that moves, MJCF or URDF: it gives the names and limits of joints and the order of bodies, which are
+    /// compared with the bodies of the input
     #[arg(long, value_name = "FILE")]
     robot: Option<PathBuf>,
-    /// --robot: the order of joints and bodies in inputs that do not name them [default: the one in which
-    /// the bodies are where the joints put them]
+    /// --robot: the order of joints and bodies in inputs that do not name them [default: the order in which the bodies
+    /// agree with the joints]
     #[arg(long, value_name = "ORDER", requires = "robot", value_parser = body_order())]
     source_body_order: Option<BodyOrder>,
     /// The robot, once it is read.
@@ -91,16 +91,15 @@ pub(crate) struct ReadingArguments {
     /// that an FBX file states to metres
     #[arg(long, value_name = "FACTOR|metres", value_parser = scale)]
     scale: Option<ScaleArgument>,
-    /// Convert to this up axis by rotating the roots: from the up axis that an FBX file states, else by
-    /// 90° about x
+    /// Convert to this up axis: rotate the roots from the up axis that an FBX file states, otherwise by 90° about x
     #[arg(id = "up_axis", long = "up-axis", alias = "up", value_name = "AXIS", value_parser = up_axis())]
     up_axis: Option<UpAxis>,
 }
 
 fn up_axis() -> impl TypedValueParser<Value = UpAxis> {
     let help = |axis| match axis {
-        UpAxis::Y => "z was up, as in SMPL's files",
-        UpAxis::Z => "y was up, as in glTF and BVH",
+        UpAxis::Y => "y up; for inputs with z up, as SMPL's files",
+        UpAxis::Z => "z up; for inputs with y up, as glTF and BVH",
     };
     one_of(UpAxis::ALL.map(|axis| (axis.name(), help(axis), axis)))
 }
@@ -368,7 +367,7 @@ fn choose(loaded: &mut Loaded, requested: &str, path: &Path) -> Result<(), Failu
     if let [_, _, ..] = &*same {
         let (name, indices) = (names::input(path), same.join(" and "));
         let message = format!(
-            "{name}: has {} animations `{requested}`, at the indices {indices}; give the index",
+            "{name}: has {} animations called `{requested}`, at the indices {indices}; give the index",
             same.len()
         );
         return Err(Failure::new(exit::ALL_INPUTS, message));

@@ -38,7 +38,7 @@ pub(crate) struct ResultArguments {
     /// List the results that would be written, skipped (--resume) and removed (--prune), and change nothing
     #[arg(short = 'n', long)]
     dry_run: bool,
-    /// In a directory of results: remove those whose inputs are gone, and their lines in the manifest
+    /// In a directory of results: remove those whose inputs do not exist any more, and their lines in the manifest
     #[arg(long)]
     prune: bool,
     /// In a directory of results: how results are named after their inputs
@@ -318,7 +318,7 @@ pub(crate) fn check_one_drawn(
     }
 }
 
-/// A destination that is no result of the plan, and can be written.
+/// Refuses a destination that is a result of the plan, or that cannot be written.
 fn apart(destination: Destination, plan: &OutputPlan) -> Result<Destination, Failure> {
     for target in &plan.targets {
         destination.refuse_same(target.path())?;

@@ -33,10 +33,10 @@ impl VerticalArguments {
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Root motion")]
 pub(crate) struct RootMotionArguments {
-    /// The motion of the root over the ground: its translation there, and its heading
+    /// What to do with the motion of the root over the ground (its translation there, and its heading)
     #[arg(long, value_name = "RULE", default_value_t, value_parser = rule())]
     root_motion: RootMotionRule,
-    /// The heading of the root
+    /// How the heading of the root is defined
     #[arg(long, value_name = "HEADING", requires = "root_motion", default_value_t, value_parser = heading())]
     heading: HeadingSource,
     /// The joint that is the root [default: the one that moves, and whose ancestors do not]
@@ -56,21 +56,23 @@ fn vertical() -> impl TypedValueParser<Value = Ground> {
 
 fn rule() -> impl TypedValueParser<Value = RootMotionRule> {
     let help = |rule| match rule {
-        RootMotionRule::Keep => "the root keeps it, as in the input",
+        RootMotionRule::Keep => "unchanged: the root keeps its motion",
         RootMotionRule::InPlace => {
-            "left out: the root stays above the origin and faces one direction"
+            "removed: the root stays above the origin and faces one direction"
         }
-        RootMotionRule::Extract => "it moves to a new joint, root_motion, the parent of the root",
+        RootMotionRule::Extract => {
+            "moved to a new joint, root_motion, which is the parent of the root"
+        }
     };
     one_of(RootMotionRule::ALL.map(|rule| (rule.name(), help(rule), rule)))
 }
 
 fn heading() -> impl TypedValueParser<Value = HeadingSource> {
     let help = |source| match source {
-        HeadingSource::Twist => "its twist about the axis that points up",
-        HeadingSource::X => "the direction of its x axis on the ground",
-        HeadingSource::Y => "that of its y axis",
-        HeadingSource::Z => "that of its z axis",
+        HeadingSource::Twist => "the twist of the root about the axis that points up",
+        HeadingSource::X => "the direction of the root's x axis on the ground",
+        HeadingSource::Y => "the direction of the root's y axis on the ground",
+        HeadingSource::Z => "the direction of the root's z axis on the ground",
     };
     one_of(HeadingSource::ALL.map(|source| (source.name(), help(source), source)))
 }
@@ -112,8 +114,8 @@ impl RootMotionArguments {
         }
         let joint = clip.set.track_name(root);
         Err(Failure::usage(format!(
-            "{name}: `{joint}` has no keys of its rotation, or steps, or is far from 0, and a file that is kept gets no \
-             new channels; write another format"
+            "{name}: `{joint}` cannot move in a copy of the file, which gets no new channels: it has no rotation keys or \
+             no translation keys, its keys are steps, or it is far from 0; write another format"
         )))
     }
 

@@ -34,8 +34,8 @@ const BROADCAST_TOLERANCE: f64 = 2e-4;
 
 #[derive(Debug, Clone, Args)]
 pub(crate) struct SamplingArguments {
-    /// Frames per second: from the first key to the last, a number, a ratio, such as 30000/1001, or `source`, the
-    /// rate of the input's keys (25 where they have none, or one below 10)
+    /// Frames per second: from the first key to the last, a number, a ratio, such as 30000/1001, or `source`, the rate
+    /// of the input's keys (25 if they have no rate, or a rate below 10)
     #[arg(
         short = 'f',
         long,
@@ -182,8 +182,8 @@ enum InGaps {
 /// `--end-frame`: the last sample of a result whose clip ends between two frames.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct EndFrameArguments {
-    /// Where a clip ends between two frames: add a sample at its end (`key`), one frame more with the value of
-    /// the end (`hold`), or nothing [default: key; hold in clips of formats without times; leave-out in NPY, and
+    /// If a clip ends between two frames: add a key at its end (`key`), one more frame with the value of the end
+    /// (`hold`), or nothing (`leave-out`) [default: key; hold in clips of formats without times; leave-out in NPY, and
     /// in results other than rotations]
     #[arg(long, value_name = "HOW", value_parser = end_frame(), conflicts_with_all = ["times", "at"])]
     end_frame: Option<EndFrame>,
@@ -225,7 +225,7 @@ impl EndFrameArguments {
 fn end_frame() -> impl TypedValueParser<Value = EndFrame> {
     let help = |end_frame| match end_frame {
         EndFrame::Key => "a sample at the end, less than a frame after the last frame",
-        EndFrame::Hold => "one frame more, after the end, with the value of the end",
+        EndFrame::Hold => "one more frame, after the end, with the value of the end",
         EndFrame::LeaveOut => "nothing: the last frame before the end is the last sample",
     };
     one_of(EndFrame::ALL.map(|end_frame| (end_frame.name(), help(end_frame), end_frame)))
@@ -434,7 +434,7 @@ impl SampleChoice {
         let mut times: Vec<f64> = resolved(&all.frames, clip, name)?.times(0).collect();
         times.extend(all.end.map(|end| end.at));
         let known = clip.key_times();
-        // The key before a gap.
+        // The key before the gap is held.
         let held = |time: f64| {
             let next = known.partition_point(|&key| key < time);
             let before = known[next.checked_sub(1)?];

@@ -229,7 +229,7 @@ pub(crate) fn paths(pattern: &str) -> Vec<PathBuf> {
             }
         };
         if name == "**" {
-            // The folders themselves too; as the last part, also all files in them.
+            // `**` also matches the folders themselves; as the last part, it matches all files in them.
             let is_last = index + 1 == components.len();
             found = found.iter().flat_map(|path| tree(path, is_last)).collect();
             remove_repeated(&mut found);
@@ -386,7 +386,7 @@ mod tests {
         assert_eq!(found("**/*.dat"), ["4.dat", "a/1.dat", "b/c/3.dat"]);
         assert_eq!(found("a/[12].*"), ["a/1.dat", "a/2.bvh"]);
         assert_eq!(found("b/?/3.dat"), ["b/c/3.dat"]);
-        // A path that ends in its folder is not another one.
+        // A path that returns to its folder by `..` names the same file, which is listed once.
         assert_eq!(found("*/../*.dat"), ["4.dat"]);
         assert_eq!(found("*/../a/1.dat"), ["a/1.dat"]);
         let round = "*/../".repeat(40);

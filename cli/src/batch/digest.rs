@@ -117,7 +117,8 @@ impl InputFile {
         let Some(changed) = changed else {
             return Ok(());
         };
-        let message = "changed while it was read; read it again when its writer is done";
+        let message =
+            "changed while it was read; try again when the other program has finished writing it";
         let name = names::input(&changed);
         Err(Failure::new(ALL_INPUTS, format!("{name}: {message}")))
     }

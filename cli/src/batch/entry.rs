@@ -217,7 +217,7 @@ impl ManifestEntry {
         }
     }
 
-    /// Removes what earlier lines say of its input: it has a result.
+    /// Removes earlier lines about the input of this entry, because the input has a result now.
     pub(crate) fn settle(&self, inputs: &mut InputEntries) {
         if !inputs.is_empty() {
             inputs.remove(self.whole().0);

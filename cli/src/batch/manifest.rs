@@ -35,7 +35,7 @@ use crate::messages::{names, words};
 /// A directory's manifest, open for one batch.
 pub(crate) struct Manifest {
     folder: PathBuf,
-    /// The directory, which stays open: whatever is put in its place meanwhile is not written into.
+    /// The directory, which stays open. If another directory gets its path meanwhile, nothing is written there.
     opened: Folder,
     previous: Arc<BTreeMap<String, ManifestEntry>>,
     /// The results of inputs that earlier batches have not finished.
@@ -88,7 +88,7 @@ impl PlannedResults {
         self.complete.insert(result.to_owned());
     }
 
-    /// Whether this batch gives the result of an input another name than this one, of the same format.
+    /// Whether this batch gives the result of an input another name, in the same format.
     fn is_renamed(&self, input: &str, result: &str) -> bool {
         let ending = |name: &str| Path::new(name).extension().map(ToOwned::to_owned);
         self.of_inputs
@@ -106,7 +106,7 @@ impl PlannedResults {
     ) -> bool {
         let whole = entry.whole().0;
         if self.complete.contains(whole) {
-            // Of a file that had several clips, and has one now.
+            // The file had several clips before and has one now, so the name of its result has changed.
             return entry.output != whole && previous.contains_key(whole);
         }
         match self.names.contains(whole) {
@@ -251,7 +251,7 @@ impl Manifest {
 
     /// Puts the lines in order.
     fn finish(mut self) -> Result<(), Failure> {
-        // Windows replaces no file that is open.
+        // Windows cannot replace a file that is open, so it is closed first.
         self.journal = None;
         self.check_in_place()?;
         let orphans = self.orphans();
@@ -494,9 +494,9 @@ impl ResultRecorder for Manifest {
         let mut inputs = std::mem::take(&mut self.inputs);
         inputs.retain(|_, entry| match InputPresence::of_input(entry) {
             _ if entry.state == InputState::Skipped => false,
-            // A directory that could not be read, or was empty, and can be read now.
+            // A directory that could not be read, or was empty, and now has files.
             _ if has_files(Path::new(&entry.input)) => false,
-            // Its result has another name now.
+            // The result of this input now has another name.
             _ if (entry.result.as_deref())
                 .is_some_and(|result| self.planned.is_renamed(&entry.input, result)) =>
             {
@@ -631,7 +631,7 @@ mod tests {
         assert_eq!(std::fs::read_dir(directory.path()).unwrap().count(), 0);
     }
 
-    /// Whatever leads to an older manifest keeps its bytes.
+    /// Hard links to an older manifest keep its bytes.
     #[test]
     fn a_manifest_is_replaced_and_never_written_into() {
         let directory = tempfile::tempdir().unwrap();

@@ -72,7 +72,7 @@ pub(crate) fn plan(
     }
     let out = options.out.unwrap_or(Path::new("-"));
     let paths = inputs.paths();
-    // A single input has a single output, however it was found.
+    // A single input gives a single output, even if it was found in a directory or by a pattern.
     let plan = match &*paths {
         [_] if goes_to_file(inputs, out) => {
             if options.resume {
@@ -84,7 +84,7 @@ pub(crate) fn plan(
             }
             let destination = Destination::new(out, options.overwrite, &paths)?;
             let format = choose(out, options.format)?;
-            // Writing a file is the only reliable check.
+            // Whether a directory can be written to is only known after writing a file.
             destination.check_writable()?;
             destination.refuse_terminal(format)?;
             OutputPlan {
@@ -173,7 +173,7 @@ fn in_folder(
         }
     }
     replaced.note();
-    // Locked files are being written: they are kept.
+    // Locked temporary files belong to a process that still writes them, so they are kept.
     let mut folders = result_folder.made;
     folders.extend(manifest.folders());
     folders.insert(folder.to_owned());
@@ -210,7 +210,7 @@ pub(crate) fn without_results(
     }
     let names = record::names(folder);
     let is_result = |found: &FoundInput| {
-        // Where inputs and results share a directory, the manifest tells them apart.
+        // If inputs and results are in one directory, the manifest tells which files are results.
         let root = found.root.as_deref();
         let is_shared = root.is_some_and(|root| is_below(root, &real));
         let path = found.path.canonicalize().unwrap_or_default();

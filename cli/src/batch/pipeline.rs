@@ -312,8 +312,9 @@ impl<'a> Pipeline<'a> {
         let start = || thread::Builder::new().spawn(move || reading.read_all(jobs, &hand_over));
         let started = begun.and_then(|()| {
             start().map_err(|error| {
-                let message =
-                    format!("the system refuses a thread: {error}; allow more (ulimit -u)");
+                let message = format!(
+                    "the system refuses to start a thread: {error}; allow more threads (ulimit -u)"
+                );
                 Failure::new(DEVICE, message)
             })
         });
@@ -588,7 +589,7 @@ impl<'a> Pipeline<'a> {
         let entry = outcome.as_ref().err().map(|failure| {
             let result = result.filter(|result| !result.is_empty());
             match failure.message().is_empty() {
-                // A signal: the input has not failed.
+                // A signal stopped the work: the input has not failed.
                 true => InputEntry::pending(path, result.unwrap_or_default()),
                 false => InputEntry::failed(path, result, failure),
             }
@@ -733,7 +734,7 @@ impl BatchRecords<'_> {
             let owner = Owner::from(entry);
             ReplacedOwners::default().check(work.path(), work.target.path(), &owner)?;
         }
-        // Clips of one input may be called as another input is: walk.glb's `Run` and walk.Run.bvh.
+        // The name of a clip may be that of another input: the clip `Run` of walk.glb, and walk.Run.bvh.
         if !self.made.insert(name.to_owned()) {
             let input = names::input(work.path());
             return Err(Failure::usage(format!(

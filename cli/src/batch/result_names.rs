@@ -129,7 +129,7 @@ pub(crate) fn name_results(
         let length = name.file_name().map_or(0, std::ffi::OsStr::len);
         if length > MAX_NAME {
             return refuse(format!(
-                "the name of its result has {length} bytes, and may have {MAX_NAME}; give the input \
+                "the name of its result has {length} bytes, at most {MAX_NAME} are possible; give the input \
                  a shorter name"
             ));
         }

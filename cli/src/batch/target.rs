@@ -577,7 +577,7 @@ impl Destination {
         progress: Option<MeasuredProgress>,
         write: impl FnOnce(&mut OutputStream) -> io::Result<()>,
     ) -> Result<WrittenFile, Failure> {
-        // Standard output has nothing to clean up: a signal may end it at once.
+        // Nothing has to be cleaned up on standard output, so a signal may end the program at once.
         let writing = (!self.is_standard()).then(WritingGuard::begin);
         let digest = self.hashed.then(Digest::default);
         let mut stream = OutputStream::new(self.open()?, progress, digest);
@@ -710,7 +710,7 @@ impl OutputStream {
 impl Write for OutputStream {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         if signals::stopped().is_some() {
-            // Not `Interrupted`, which would be tried again.
+            // Not `ErrorKind::Interrupted`, because callers repeat the call then.
             return Err(io::Error::other("stopped by a signal"));
         }
         let result = self.output.write(bytes);

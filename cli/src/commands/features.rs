@@ -106,8 +106,7 @@ struct FeatureReport {
 
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     if arguments.contact_window.is_multiple_of(2) {
-        let message =
-            "--contact-window: give an odd number of frames, so that each is in their middle";
+        let message = "--contact-window: give an odd number of frames, because the frame is in the middle of the window";
         return Err(Failure::usage(message));
     }
     let files = arguments.inputs.gather(false)?;
@@ -128,8 +127,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         && !out.is_dir()
     {
         let (out, name) = (out.display(), named.name);
-        let message =
-            format!("{out}: ends as {name}, and features are npz; end the output in .npz");
+        let message = format!(
+            "{out}: is the name of {name}, and features are written as NPZ; end the output in .npz"
+        );
         return Err(Failure::usage(message));
     }
     arguments.inputs.reading.robot()?;
@@ -289,7 +289,7 @@ impl Arguments {
             Ok::<_, Failure>((samples.times, poses.map_err(failed)?))
         };
         let (times, poses) = at(&SampleTimes::rate(rate))?;
-        // Velocities are differences over a part of a frame, inside the clip.
+        // Velocities are differences of samples a 32nd of a frame apart, inside the clip.
         let step = rate.time_of(1) / 64.0;
         let (first, last) = clip.set.time_span().unwrap_or_default();
         let beside = |side: f64| -> Vec<f64> {

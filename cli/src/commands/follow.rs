@@ -125,7 +125,8 @@ impl Arguments {
             )?;
         }
         if frame != PathFrame::Minimal {
-            let remedy = "only minimal frames have a rotation left over; leave it out";
+            let remedy =
+                "only minimal frames can have a remaining rotation at the end; leave it out";
             refuse(("twist", "--twist"), "other frames than minimal", remedy)?;
         }
         Ok(())

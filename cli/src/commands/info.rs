@@ -201,7 +201,7 @@ fn summarise(
         let refused = |error| arguments.inputs.refused(&error);
         let contents = PickleSummary::read(path, &options).map_err(refused)?;
         summaries.push(Report::Pickle(contents));
-        // A pickle may hold anything; its values are listed whether or not they are a motion.
+        // A pickle may contain anything, so its values are listed even if they are not a motion.
         let clips = format.open(path, &options);
         if clips.is_err_and(|error| error.code == Code::UnknownArrays) {
             return Ok(());
@@ -218,7 +218,7 @@ fn summarise(
         if index > 0 {
             summary.warnings.clear();
         }
-        // Keys that follow the curves of a file are not meant for c2, so there is no warning about c2.
+        // Keys that were added to follow the curves of a file are not meant for c2, so there is no warning about c2.
         let follows = arguments.inputs.follows_curves(path);
         let smoothest = Interpolation::from(C2);
         let of_curves = (!follows)

@@ -50,23 +50,23 @@ pub(crate) struct Arguments {
     /// The file with the skeleton: glTF, with or without animations, or the first clip of any other file
     #[arg(long, value_name = "FILE")]
     onto: PathBuf,
-    /// The joints that belong together, as JSON: {"joint of --onto": "joint of the input", …} [default: by the
-    /// parts of the body that their names mean]
+    /// The joints that belong together, as JSON: {"joint of --onto": "joint of the input", …} [default: by the parts of
+    /// the body that their names stand for]
     #[arg(long, value_name = "FILE")]
     bones: Option<PathBuf>,
     /// How the rest poses are compared
     #[arg(long, value_name = "HOW", default_value_t, value_parser = rest())]
     rest: RestAlignment,
-    /// The pose of this frame of the input, from 0, is its rest pose, such as a T-pose in which takes begin [default:
-    /// the rest pose of its skeleton]
+    /// Use the pose of this frame of the input, counted from 0, as its rest pose, such as a T-pose at the beginning
+    /// [default: the rest pose of its skeleton]
     #[arg(long, value_name = "FRAME")]
     rest_frame: Option<usize>,
     /// The factor for the translations of the hips: hips, the ratio of their heights; legs, the ratio of the
     /// lengths of the legs; or a number
     #[arg(long, value_name = "hips|legs|FACTOR", default_value = "hips", value_parser = hips_scale)]
     hips_scale: HipsScale,
-    /// Write a report: as JSON, the pairs of joints, the joints without a partner, and how far hands and feet are from where
-    /// the input has them; needs a single input
+    /// Write a report: as JSON, the pairs of joints, the joints without a partner, and the distances of hands and feet
+    /// from those of the input; needs a single input
     #[arg(long, value_name = "FILE")]
     report: Option<PathBuf>,
     /// The sequence of axes: of the angles of BVH, three different ones [default: those of the input, else ZXY]
@@ -79,7 +79,7 @@ fn rest() -> impl TypedValueParser<Value = RestAlignment> {
         RestAlignment::Auto => "directions, if one of a limb differs by more than 5°, else same",
         RestAlignment::Same => "the same rotations are the same pose",
         RestAlignment::Directions => {
-            "the arms and legs of the skeleton are first turned to the directions that the input's have"
+            "the arms and legs of the skeleton are first rotated to the directions of the input's arms and legs"
         }
     };
     one_of(RestAlignment::ALL.map(|rest| (rest.name(), help(rest), rest)))
@@ -284,7 +284,7 @@ impl Arguments {
             }
             if report.are_axes_assumed {
                 let message = "the axes of both skeletons are taken to be the same, because it is not known which joints \
-                               are the parts of the body, or where these are at rest; --up-axis turns the input";
+                               are the parts of the body, or where these are at rest; --up-axis rotates the input";
                 words::note(&format!("{name}: {message}"));
             }
             reports.push(ClipReport::new(&motion, report));

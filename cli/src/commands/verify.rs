@@ -150,7 +150,7 @@ impl Arguments {
         let set = &clip.set;
         let outside = self.interpolation.outside();
         let frames = samples.of(clip, outside, name)?;
-        // Two results are in memory at once.
+        // Memory for two results, which exist at the same time.
         room::in_memory(name, set, &frames, 2)?;
         let mut lines = Vec::new();
         for &method in methods {
@@ -160,7 +160,7 @@ impl Arguments {
             }
             let mut found = tumble::verify::verify(&device.engine, set, interpolation, &frames)
                 .map_err(|error| Failure::evaluating(name, &error))?;
-            // Printed times are those of the file's clock.
+            // Times are printed as in the file: with the clip's time offset.
             let positions = [&mut found.worst, &mut found.first_difference];
             for position in positions.into_iter().flatten() {
                 position.time += clip.time_offset as f64;

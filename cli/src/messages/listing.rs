@@ -120,7 +120,7 @@ mod tests {
         ];
         let text = json_printable(&serde_json::to_string_pretty(&names).unwrap());
         assert_eq!(serde_json::from_str::<Vec<String>>(&text).unwrap(), names);
-        // A tag is two units of UTF-16; a line end has a shorter escape.
+        // A tag character is two units of UTF-16, and is escaped twice; a line end has a shorter escape.
         assert_eq!(text.matches("\\u").count(), 5, "{text}");
         assert_eq!(printable_lines(&text), text);
     }

@@ -73,7 +73,7 @@ pub(crate) fn distinct_stems(paths: &[PathBuf]) -> Vec<String> {
             names[index] = format!("{}-{}", names[index], ending.to_string_lossy());
         }
     }
-    // `a/b-c.dat` beside `a-b/c.dat`.
+    // Different paths may give the same name: `a/b-c.dat` and `a-b/c.dat`.
     for index in shared_names(&names).into_iter().skip(1) {
         names[index] = format!("{}-{}", names[index], index + 1);
     }

@@ -127,7 +127,7 @@ impl Progress {
         let seconds_left = (self.done > 0).then(|| seconds / self.done as f64 * left);
         let line = json!({
             "progress": self.label,
-            // A file has a few bytes more than its numbers.
+            // A file has some bytes in addition to its numbers, so more than the total may have been read.
             "done": self.done.min(self.total),
             "total": self.total,
             "failed": self.failed,
@@ -135,7 +135,7 @@ impl Progress {
             "seconds": seconds,
             "seconds_left": seconds_left,
         });
-        // A reader that is gone must not end the work.
+        // If the reader of the output has ended, the work continues.
         let _ = writeln!(std::io::stderr(), "{line}");
     }
 }
@@ -170,9 +170,9 @@ pub(crate) fn busy<T>(label: &str, work: impl FnOnce() -> T) -> T {
     }
     let (done, finished) = mpsc::channel::<()>();
     thread::scope(|scope| {
-        // Without a thread for it there is no spinner.
+        // If no thread can be started, no spinner is shown.
         let _ = thread::Builder::new().spawn_scoped(scope, move || {
-            // A sender that is dropped ends the wait, also when the work panics.
+            // The sender is dropped at the end of the work, also after a panic; this ends the wait.
             if finished.recv_timeout(PATIENCE) == Err(mpsc::RecvTimeoutError::Timeout) {
                 let style = ProgressStyle::with_template("{spinner} {msg} {elapsed}")
                     .unwrap_or_else(|_| ProgressStyle::default_spinner());

@@ -43,7 +43,7 @@ fn code(signal: i32) -> u8 {
 
 /// Ends the program, or leaves a mark for the writer of a file and for the batch.
 fn handle_signal(signal: i32) {
-    // Printed without the lock, which the main thread needs while this one may have to wait for a reader.
+    // Print without holding the lock: printing may have to wait for a reader, and the main thread needs the lock.
     if stopped().is_none() {
         let name = signal_hook::low_level::signal_name(signal).unwrap_or("a signal");
         words::line(&format!("interrupted by {name}"));
@@ -61,7 +61,7 @@ fn handle_signal(signal: i32) {
             end(&state, signal);
         }
     };
-    // Without the thread, the batch ends at its next input, or with a second signal.
+    // If the thread cannot be started, a signal ends the batch at its next input, and a second signal at once.
     let _ = std::thread::Builder::new().spawn(wait);
 }
 
@@ -83,15 +83,15 @@ fn wait_for_signals() {
     use signal_hook::consts::{SIGHUP, SIGINT, SIGQUIT, SIGTERM, SIGXFSZ};
     use signal_hook::iterator::Signals;
 
-    // A file that may not grow (`ulimit -f`) is an error that its writer reports, and then removes the
-    // file; the signal would end the program before that.
+    // With `ulimit -f`, a write beyond the limit sends this signal, which would end the program. If it is ignored, the
+    // write fails instead, and the writer reports this and removes the file.
     let ignored = ignored();
     let all = [SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGXFSZ];
     let heeded = all
         .into_iter()
         .filter(|signal| ignored >> (signal - 1) & 1 == 0);
-    // The signals are registered here and not in the thread, because a thread may take long to start, and the first
-    // file may be opened before.
+    // The signals are registered before the thread is started, because starting takes time, and the first file may be
+    // opened meanwhile.
     let Ok(mut signals) = Signals::new(heeded) else {
         return;
     };

@@ -55,7 +55,7 @@ pub(crate) fn warning(message: &str) {
     });
 }
 
-/// One line, whatever names are in it.
+/// Prints a note as one line, also if names in it contain line ends.
 pub(crate) fn note(message: &str) {
     if !is_quiet() {
         line(message);
@@ -80,7 +80,7 @@ pub(crate) fn usage(error: &mut clap::Error, arguments: &[OsString]) {
     for word in arguments {
         let word = word.to_string_lossy();
         let shown = printable(&word);
-        // The part after `--option=` is also printed safely.
+        // The part of a word after `--option=` is printed safely, too.
         let parts = word.split('=').zip(shown.split('='));
         for (word, shown) in std::iter::once((&*word, &*shown)).chain(parts) {
             if word != shown {
@@ -88,7 +88,7 @@ pub(crate) fn usage(error: &mut clap::Error, arguments: &[OsString]) {
             }
         }
     }
-    // A stream that is closed has no reader.
+    // Errors of writing are ignored: if the stream is closed, nobody reads it.
     let _ = match error.use_stderr() {
         true => write!(anstream::stderr(), "{text}"),
         false => write!(anstream::stdout(), "{text}"),
@@ -120,7 +120,7 @@ fn reason(payload: &(dyn Any + Send)) -> &str {
 pub(crate) fn explain_panics() {
     std::panic::set_hook(Box::new(|info| {
         let message = reason(info.payload());
-        // A panic of a library on damaged bytes, which is reported as an error of the input.
+        // A library panicked on damaged bytes. This is reported as an error of the input, so nothing is printed here.
         if is_guarded() {
             return;
         }

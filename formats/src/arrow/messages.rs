@@ -91,7 +91,7 @@ impl<'a> Messages<'a> {
 
     fn claims(&self) -> Diagnostic {
         let message = format!(
-            "the file has {} bytes and states that it has more than could be compressed into it; it is damaged",
+            "the file has {} bytes and states more data than could be compressed into them; it is damaged",
             self.bytes.len()
         );
         Diagnostic::new(self.name, Code::TableClaims, message)
@@ -119,7 +119,7 @@ impl<'a> Messages<'a> {
             })
             .collect();
         let blocks = blocks.ok_or_else(wrong)?;
-        // Overlapping blocks could describe much more data than the file contains.
+        // If blocks overlap, a small file could describe much more data than it contains.
         let total: u64 = blocks.iter().fold(0, |total, &(_, head, body)| {
             total.saturating_add(head).saturating_add(body)
         });
@@ -138,7 +138,7 @@ impl<'a> Messages<'a> {
             None => {
                 let found = self.next_of_stream()?;
                 let schema = found.and_then(|(message, _)| message.header_as_schema());
-                let missing = "there is no schema at its beginning; it is not Arrow IPC, or cut";
+                let missing = "it does not begin with a schema; it is not Arrow IPC, or it is cut";
                 schema.ok_or_else(|| self.damaged(missing))?
             }
         };
@@ -200,7 +200,7 @@ impl<'a> Messages<'a> {
         if body > rest.len() - head {
             return Err(outside());
         }
-        // A mark of four bytes, which old files leave out, and the length.
+        // Four bytes that mark a continuation (old files do not have them), then the length.
         let before = if metadata.starts_with(&CONTINUATION) {
             8
         } else {
@@ -277,7 +277,7 @@ impl<'a> Messages<'a> {
             used = used.saturating_add(length as u64);
             if compression.is_some() && !bytes.is_empty() {
                 let prefix = bytes.first_chunk::<PREFIX>().ok_or_else(wrong)?;
-                // A length of -1 marks a buffer that is not packed.
+                // The length -1 marks a buffer that is not compressed.
                 let unpacked = u64::try_from(i64::from_le_bytes(*prefix)).unwrap_or(0);
                 claimed = claimed.saturating_add(unpacked);
             }

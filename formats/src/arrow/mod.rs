@@ -99,8 +99,7 @@ fn read_table(
         .iter()
         .map(|column| (column, schema.field(column.index).data_type()));
     let mut gather = Gather::new(name, types)?;
-    // Only requested columns are decoded, and only their dictionaries: their types are known
-    // to be simple.
+    // Decode only the requested columns, and only their dictionaries. Their types are known to be simple.
     let mut projection: Vec<usize> = plan.columns.iter().map(|column| column.index).collect();
     projection.sort_unstable();
     projection.dedup();

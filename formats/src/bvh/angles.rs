@@ -38,7 +38,7 @@ pub(super) fn nearest(q: DQuat, axes: [usize; 3], before: [f64; 3]) -> [f64; 3] 
         second,
         half_sum - half_difference,
     ];
-    // Turning half round by the outer two undoes mirroring the middle one.
+    // Rotating by half a turn about both outer axes cancels the mirrored middle angle.
     let other = [angles[0] + PI, PI - second, angles[2] + PI];
     let [angles, other] = [angles, other].map(|angles| {
         let circles = |i: usize| ((angles[i] - before[i]) / TAU).round();
@@ -77,7 +77,7 @@ mod tests {
             let mut before = [0.3, -0.2, 0.1];
             for step in 0..20_000 {
                 let t = f64::from(step) * 1e-3;
-                // The middle angle goes through both locks, and stays in one for a while.
+                // The middle angle passes through both gimbal locks, and stays in one of them for some time.
                 let middle = (3.0 * t.sin()).clamp(-FRAC_PI_2, 2.5);
                 let expected = [0.3 + 2.0 * t, middle, 0.1 - 1.3 * t];
                 let q = DQuat::from_euler(order, expected[0], expected[1], expected[2]);
@@ -101,7 +101,8 @@ mod tests {
                 let found = nearest(q, axes, [0.4, middle, 0.35]);
                 let expected = DQuat::from_euler(order, found[0], found[1], found[2]);
                 assert!(expected.dot(q).abs() > 1.0 - 1e-14, "{order:?}: {found:?}");
-                // The free part stays that of the frame before, so that each moves half the way.
+                // In gimbal lock only the sum (or difference) of the outer angles is determined, so each moves by half
+                // of the change.
                 let moved = (found[0] - 0.4).abs().max((found[2] - 0.35).abs());
                 assert!(moved <= 0.1 + 1e-7, "{order:?}, {middle}: {found:?}");
             }

@@ -240,7 +240,7 @@ impl<R: BufRead> Parser<'_, R> {
                     let (exact, site) = (DVec3::from(offset), DVec3::from(offset).as_vec3());
                     let lost = (site.as_dvec3() - exact).abs().max_element();
                     if exact.abs().max_element() >= SMALL && lost > 0.0 {
-                        // Three digits, without an exponent.
+                        // Round to three digits, but print without an exponent.
                         let lost = format!("{lost:.2e}").parse().unwrap_or(lost);
                         let message = format!(
                             "an End Site is stored in f32, up to {lost} from its position in the file"
@@ -259,13 +259,13 @@ impl<R: BufRead> Parser<'_, R> {
     /// Reads `CHANNELS count name…`, on one line.
     fn channels(&mut self, keyword: &Word) -> Result<(), Diagnostic> {
         let Some(count) = self.word_before(&AFTER_CHANNELS) else {
-            let message = "CHANNELS without their number; write `CHANNELS 0`".to_owned();
+            let message = "CHANNELS without a number; write `CHANNELS 0`".to_owned();
             return Err(self.refuse(keyword, Code::BvhChannelCount, message));
         };
         let (mut names, mut named) = (Vec::new(), 0usize);
         while let Some(word) = self.word_before(&AFTER_CHANNELS) {
             named += 1;
-            // Seven are enough for the message: one of them occurs twice, because there are only six names.
+            // Seven names are enough for the message: there are only six channels, so one of seven occurs twice.
             if names.len() < 7 {
                 names.push(word);
             }

@@ -116,7 +116,7 @@ impl FrameKeys {
         lines: &Lines<R>,
         hierarchy: &Hierarchy,
     ) -> Result<Motion, Diagnostic> {
-        // Without frames every track has one key, at time 0.
+        // If there are no frames, every track gets one key, at time 0.
         let count = self.count.max(1);
         let times: Vec<f64> = (0..count as u64)
             .map(|frame| self.rate.time_of(frame))
@@ -202,8 +202,8 @@ impl FrameKeys {
 
 /// Programs that know the rotations of joints and not their positions, as of a body whose shape is not known, write
 /// such files.
-const NO_OFFSETS: &str = "all offsets in the file are 0, so that it does not say where joints are relative to their \
-                          parents; give their places with --offsets";
+const NO_OFFSETS: &str = "all offsets in the file are 0, so the positions of joints relative to their parents are \
+                          unknown; give them with --offsets";
 
 /// The interpolation of a channel, if it has keys.
 fn linear(has_keys: bool) -> Option<ChannelInterpolation> {
@@ -241,7 +241,7 @@ fn read_frames<R: BufRead>(lines: &mut Lines<R>) -> Result<u64, Diagnostic> {
 }
 
 /// Reads the rate of `Frame Time: 0.0083333`. With `raw_times` the frame time is the printed number, not that of a common
-/// rate. A rate that replaces it does so whatever the number is.
+/// rate. If another rate replaces it, the number is not checked.
 fn read_rate<R: BufRead>(
     lines: &mut Lines<R>,
     options: &ReadOptions,

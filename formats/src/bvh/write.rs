@@ -154,7 +154,7 @@ fn check(sampled: &SampledClip<'_>) -> io::Result<Result<FrameRate, String>> {
         ((time - times[0]) * rate.per_second() - frame as f64).abs() > 0.01
     };
     if let Some((_, time)) = times.iter().enumerate().find(|&sample| off(sample)) {
-        let message = format!("the sample at {time} s is not on the next frame of {rate} a second");
+        let message = format!("the sample at {time} s is not at the next frame of {rate} fps");
         return Ok(Err(message));
     }
     Ok(Ok(rate))
@@ -231,7 +231,7 @@ fn node(
     let is_moved = is_root || (0..3).any(moves);
     let has_rest = (has_positions(&channels) || is_moved) && !clip.skeleton.is_empty();
     let offset = if has_rest { rest } else { first };
-    // Coordinates without a channel in the file, whose OFFSET is no longer right.
+    // Coordinates that move although the file has no channel for them, so that OFFSET is not enough.
     let is_missing = |axis: &usize| {
         !channels.contains(&WrittenChannel::Position(*axis))
             && (is_root || moves(*axis) || first[*axis] != offset[*axis])
@@ -249,7 +249,7 @@ fn node(
     let file_axes = WrittenChannel::rotations(&channels);
     let mut axes = sequence.unwrap_or([2, 0, 1]);
     if sequence.is_none() && !file_axes.is_empty() {
-        // The file's axes, then those that it leaves out.
+        // First the axes of the file in their order, then those that the file does not have.
         let others = (0..3).filter(|axis| !file_axes.contains(axis));
         let all = file_axes.iter().copied().chain(others);
         axes.iter_mut()

@@ -44,7 +44,7 @@ pub fn read_csv(name: &str, bytes: Vec<u8>, options: &ReadOptions) -> Result<Loa
         return Ok(loaded);
     }
     if options.source_order.is_some() {
-        let message = "the names of the columns say which is which; --source-order is for files without names";
+        let message = "the columns have names, which state the order; --source-order is for files without names";
         return Err(Diagnostic::new(name, Code::Map, message));
     }
     let mut sheet = Sheet {
@@ -125,7 +125,7 @@ pub fn read_csv(name: &str, bytes: Vec<u8>, options: &ReadOptions) -> Result<Loa
             continue;
         }
         sheet.check_width(&record, &names)?;
-        // A number of a column or a row's location.
+        // Memory for a number of each column and for the location of the row.
         let charged = budget.take(columns.len() + 1, size_of::<f64>());
         charged.map_err(|error| Diagnostic::new(name, Code::Memory, error.to_string()))?;
         if starts.is_empty()
@@ -239,7 +239,7 @@ impl<'a> Sheet<'a> {
             return Ok(());
         }
         let location = self.cell(record, width.min(found));
-        // `0,5,1,25` has a cell for each part of a number.
+        // `0,5,1,25` is a decimal comma: the parts of a number are in separate cells.
         let is_digits = |cell: &[u8]| cell.iter().all(|it| it.is_ascii_digit() || *it == b'-');
         let hint = match found > width && record.iter().all(is_digits) {
             true => "; if numbers have decimal commas, write them with points",
@@ -325,7 +325,7 @@ fn start_of(record: &ByteRecord) -> (usize, u64) {
 fn cell_location(bytes: &[u8], (start, lines): (usize, u64), column: usize) -> Location {
     let ends = |byte: &u8| matches!(byte, b'\r' | b'\n');
     let rest = bytes.get(start..).unwrap_or_default();
-    // The record before ends there; blank lines may follow it.
+    // The end of the previous record; blank lines may follow.
     let mut at = start + rest.iter().take_while(|byte| ends(byte)).count();
     let (mut commas, mut quoted) = (0, false);
     while let Some(&byte) = bytes.get(at) {
@@ -382,7 +382,7 @@ impl TextCell<'_> {
         known: &mut HashMap<String, u32>,
         warnings: &mut Warnings,
     ) -> Result<(), Diagnostic> {
-        // A cell without a value is stored as a placeholder; its column is refused for it.
+        // An empty cell is stored as a placeholder. The column is refused later because of it.
         if need == ColumnNeed::Number
             && self.sheet.bridges_gaps
             && (self.text.is_empty() || number::is_nan(&as_text(self.text)))

@@ -33,7 +33,7 @@ pub(crate) fn narrowed(
     let is_stated = options.source_rate.or(options.override_rate).is_some();
     options.source_rate = options.source_rate.or_else(|| FrameRate::new(30, 1).ok());
     let warning = (!is_stated).then(|| {
-        let message = "the file has no rate; 30 frames a second are assumed, as GVHMR has; --source-fps gives another";
+        let message = "the file has no rate; 30 frames a second are assumed, as for GVHMR; --source-fps gives another";
         Diagnostic::new(&archive.file, Code::AssumedRate, message)
     });
     Some((options, warning))

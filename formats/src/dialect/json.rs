@@ -121,7 +121,8 @@ pub fn read_json(file: &str, bytes: Vec<u8>, options: &ReadOptions) -> Result<Lo
             .map_err(|error| Diagnostic::new(file, Code::Json, error.to_string()).inside("info"))?;
         return episode(file, data, &info, budget, options, &mut warnings);
     }
-    let message = "neither `Frames` of AMP or DeepMimic nor the `info` and `data` of xr_teleoperate are there";
+    let message =
+        "the file has neither `Frames` (AMP, DeepMimic) nor `info` and `data` (xr_teleoperate)";
     Err(Diagnostic::new(file, Code::UnknownArrays, message))
 }
 
@@ -138,7 +139,7 @@ fn rows(file: &str, frames: &Value) -> Result<(Vec<f64>, usize), Diagnostic> {
         let expected = *width.get_or_insert(list.len());
         if list.len() != expected || expected <= ROOT {
             let message = format!(
-                "{} numbers; each frame has those of the root, {ROOT}, and of joints, {expected} in the first",
+                "{} numbers, but the first frame has {expected}: {ROOT} numbers of the root, then those of joints",
                 list.len()
             );
             return Err(refuse(index, message));
@@ -170,7 +171,7 @@ fn frames_of_amp(
         true => {
             warnings.warn(Code::ArraysNotRead, || {
                 let message = format!(
-                    "{} of the {a1} numbers of a frame are where toes are, and velocities, which are not read",
+                    "{} of the {a1} numbers of a frame are positions of toes, and velocities, which are not read",
                     a1 - ROOT - joints
                 );
                 (None, message)
@@ -251,8 +252,8 @@ fn frames_of_deepmimic(
     let (numbers, width) = rows(file, frames)?;
     if width != DEEPMIMIC {
         let message = format!(
-            "frames of {width} numbers; those of DeepMimic's humanoid have {DEEPMIMIC}, and those of AMP stand beside \
-             a `FrameDuration`"
+            "the frames have {width} numbers; those of DeepMimic's humanoid have {DEEPMIMIC}, and files of AMP have a \
+             `FrameDuration`"
         );
         return Err(Diagnostic::new(file, Code::Shape, message).inside("Frames"));
     }
@@ -272,7 +273,7 @@ fn frames_of_deepmimic(
         *end += duration;
         Some(start)
     });
-    // The rate, or the times where frames last differently.
+    // The rate, or the times if frames have different durations.
     let clock = match is_even {
         true => ("fps".to_owned(), Vec::new(), vec![1.0 / durations[0]]),
         false => ("times".to_owned(), vec![count], times.collect()),

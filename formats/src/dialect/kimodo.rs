@@ -35,7 +35,7 @@ pub(super) static DIALECT: Dialect = Dialect {
         let mut plan = ArchivePlan {
             is_world: true,
             is_part: true,
-            // They follow from the poses of all joints.
+            // These arrays follow from the poses of all joints.
             companions: &[
                 "local_rot_mats",
                 "root_positions",

@@ -28,7 +28,7 @@ pub(super) static DIALECT: Dialect = Dialect {
             root(archive, "frames", KeyKind::RotationVector, 3)?,
         )?;
         plan.add(archive, root(archive, "frames", KeyKind::Translation, 0)?)?;
-        // A ball has three numbers; the file does not say which joints are balls.
+        // Joints that are balls have three numbers each, but the file does not say which joints are balls.
         let columns = (member(archive, "frames")?, Layout::FrameMajor, 6);
         plan.add_scalars(archive, columns, None, |_| ScalarKind::Angle, warnings)?;
         plan.read_rate(archive, &["fps"])?;

@@ -120,8 +120,9 @@ fn rows_of(
         let rows = header.shape.first().copied().unwrap_or(0);
         let is_row = |number: f64| number >= 0.0 && number.fract() == 0.0;
         if !(is_row(start) && is_row(count) && start + count <= rows as f64) || header.is_fortran {
-            let message =
-                format!("the clip of {count} rows from {start} on is not in these {rows} rows");
+            let message = format!(
+                "a clip has {count} rows from row {start} on, but there are only {rows} rows"
+            );
             return Err(archive.refuse(member, Code::Shape, message));
         }
         let whole = &array.bytes[header.start..];

@@ -80,7 +80,7 @@ pub(crate) fn read(
     let width = cells.len();
     let budget = Budget::of(bytes.len(), options.limits);
     let norm = |row: &[f64]| row[3..7].iter().map(|q| q * q).sum::<f64>().sqrt();
-    // A large first number is a time, as that of VINS-Mono's files.
+    // If the first number is large, it is a time, as in VINS-Mono's files.
     let is_unit =
         |row: &[f64]| (norm(row) - 1.0).abs() < NORM && TimeUnit::of_large(row[0]).is_none();
     let is_unitree = matches!(dialect, TextDialect::Unitree);

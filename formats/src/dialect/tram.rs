@@ -20,7 +20,7 @@ pub(super) static DIALECT: Dialect = Dialect {
             archive,
             root(archive, "pred_trans", KeyKind::Translation, 0)?,
         )?;
-        // Frames in which the person is not seen are left out.
+        // Frames in which the person is not visible are missing in the file.
         plan.frame_numbers = member(archive, "frame").ok();
         plan.read_rate(archive, &["fps"])?;
         Ok(plan)

@@ -20,7 +20,7 @@ pub(super) static DIALECT: Dialect = Dialect {
         let mut plan = smpl_body(24);
         plan.add(archive, array("pose_world", KeyKind::RotationVector)?)?;
         plan.add(archive, array("trans_world", KeyKind::Translation)?)?;
-        // Frames in which the person is not seen are left out.
+        // Frames in which the person is not visible are missing in the file.
         plan.frame_numbers = member(archive, "frame_ids").ok();
         plan.read_rate(archive, &["fps"])?;
         Ok(plan)

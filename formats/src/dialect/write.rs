@@ -89,7 +89,8 @@ pub fn written_joints(tree: &Tree, bodies: &[usize]) -> Vec<usize> {
 }
 
 /// For motions that no dialect can hold.
-const OTHER_FILES: &str = "leave out --dialect (in Python `dialect`) and write NPZ, CSV or Parquet, which have room for it";
+const OTHER_FILES: &str =
+    "leave out --dialect (in Python `dialect`) and write NPZ, CSV or Parquet, which can store it";
 
 impl WrittenDialect {
     /// The dialect of this name; case is ignored.
@@ -155,8 +156,8 @@ impl WrittenDialect {
             .filter(|&assumed| rate.per_second() != assumed as f64);
         let warning = assumed.map(|assumed| {
             let message = format!(
-                "{} has no rate, and its readers take {assumed} frames a second; these are {rate}: tell its readers, or \
-                 use `tumble eval --fps {assumed}`",
+                "{} stores no rate, and programs that read it assume {assumed} frames a second; these have {rate}: \
+                 set the rate there, or use `tumble eval --fps {assumed}`",
                 self.name
             );
             Diagnostic::new(motion.output, Code::AssumedRate, message)

@@ -237,7 +237,7 @@ impl<'a> Curve<'a> {
         };
         let (Some(before), Some(next)) = (next.checked_sub(1).map(|i| &keys[i]), keys.get(next))
         else {
-            // The first key or the last.
+            // Before the first key or after the last one.
             return keys[next.min(keys.len() - 1)].value;
         };
         if before.time == time {
@@ -328,7 +328,7 @@ fn euler_rotation(angles: DVec3, order: RotationOrder) -> DQuat {
         DQuat::from_xyzw(0.0, sy, 0.0, cy),
         DQuat::from_xyzw(0.0, 0.0, sz, cz),
     ];
-    // The first axis turns first.
+    // The rotation about the first axis is applied first, so it is the rightmost factor.
     match order {
         RotationOrder::Xyz => z * y * x,
         RotationOrder::Xzy => y * z * x,
@@ -397,7 +397,7 @@ mod tests {
             }
         }
         assert!(here >= 5 && asked >= 1, "{here} {asked}");
-        // Most of the others are of one character, whose bones keep their scales.
+        // Most other nodes belong to one character, whose bones inherit scales as usual.
         assert!(!has_shared || here >= 30, "{here} {asked}");
     }
 }

@@ -256,7 +256,7 @@ impl ChannelFollower<'_> {
 
     fn is_line(&self, piece: &FollowedInterval, bound: f64) -> Result<bool, Unfollowed> {
         let [p, q] = piece.ends;
-        // Near half a turn, the direction of the arc is not determined, so this is not a line.
+        // Near half a turn, the direction of the arc is not determined, so the channel is not treated as a line.
         if self.kind == ChannelKind::Rotation && p.dot(q) < 0.1 {
             return Ok(false);
         }
@@ -564,7 +564,7 @@ mod tests {
             [(0.0, 1.0), (1.0, 2.0), (2.0, 2.0)].map(|(time, x)| (time, ChannelValue::X * x));
         let found = follow.keys(&stops, &thirds).unwrap();
         assert_eq!(found, (FollowedKeys::Step(keys.to_vec()), true));
-        // A line up to time 1, then 0.
+        // X until time 1, then 0.
         let saw = |time: f64| Ok(ChannelValue::X * if time < 1.0 { time } else { 0.0 });
         follow.value = &saw;
         let stops = [

@@ -179,7 +179,7 @@ impl StackLayers {
         let mut known: HashMap<Vec<u32>, usize> = HashMap::new();
         for (index, layers) in layers_of.into_iter().enumerate() {
             let node = &scene.nodes[index];
-            // The scales of others determine its transform too.
+            // The scales of other nodes influence the transform of such a node, too.
             if layers.len() == self.audible.len() || inherits_scale(node) || is_spheric(node) {
                 continue;
             }
@@ -217,7 +217,7 @@ impl StackLayers {
                 }
             }
         }
-        // The lowest layer has no others to override.
+        // The lowest layer overrides no other layer.
         let lowest = self.audible.first().copied();
         let is_weighted = |weighted: &WeightedLayer| {
             let layer = &stack.layers[weighted.layer];

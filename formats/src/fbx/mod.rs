@@ -185,7 +185,7 @@ fn no_anim(name: &str, error: &ufbx::Error) -> Diagnostic {
 
 fn load(name: &str, bytes: &[u8], budget: &Budget) -> Result<SceneRoot, Diagnostic> {
     let half = usize::try_from(budget.left() / 2).unwrap_or(usize::MAX);
-    // `ufbx` takes 0 for no limit.
+    // For `ufbx`, 0 means no limit.
     let half = half.max(1);
     let allocator = || AllocatorOpts {
         memory_limit: half,
@@ -200,7 +200,7 @@ fn load(name: &str, bytes: &[u8], budget: &Budget) -> Result<SceneRoot, Diagnost
         skip_mesh_parts: true,
         node_depth_limit: DEPTH,
         file_format: FileFormat::Fbx,
-        // Nodes then scale their children as in every other format.
+        // With this option, children inherit scales as in every other format.
         inherit_mode_handling: InheritModeHandling::Compensate,
         ..LoadOpts::default()
     };
@@ -248,7 +248,7 @@ fn space(scene: &SceneRoot) -> Option<Space> {
         CoordinateAxis::NegativeZ => DVec3::NEG_Z,
         CoordinateAxis::Unknown => return None,
     };
-    // Exact for 1 cm and 1 inch, which files give as a factor of 1 cm.
+    // Files state units as factors of 1 cm. Rounding makes 1 cm and 1 inch exact in metres.
     let metres = (scene.settings.unit_meters * 1e9).round() / 1e9;
     (metres.is_finite() && metres > 0.0).then_some(Space { up, metres })
 }
@@ -448,7 +448,7 @@ impl FbxReader<'_> {
         };
         let mut nodes: Vec<NodeKeys> = nodes.into_iter().collect::<Result<_, _>>()?;
         let [start, end] = takes.span.map(|time| self.clip_time(time, takes.grid));
-        // If nothing moves in a take, its first track gets a key at each end, so that the clip has the take's length.
+        // If nothing moves in a take, its first track gets a key at both ends. This stores the length of the take.
         if start < end
             && nodes.iter().all(NodeKeys::rests)
             && let Some(NodeKeys { rotation, .. }) = nodes.first_mut()
@@ -528,7 +528,12 @@ impl FbxReader<'_> {
                     1 => "1 key lies".to_owned(),
                     count => format!("{count} keys lie"),
                 };
-                (inside(), format!("{keys} outside the take, {begin} to {end} s, and what lies there is left out"))
+                (
+                    inside(),
+                    format!(
+                        "{keys} outside the take ({begin} to {end} s); the motion there is left out"
+                    ),
+                )
             });
         }
         if !takes.others.is_empty() {
@@ -582,8 +587,8 @@ impl FbxReader<'_> {
         match keys.rotation {
             FollowedKeys::Rest(value) => {
                 let key = quat(value);
-                // All clips of a file share the rest poses of nodes. A node with another pose in this clip gets a
-                // key.
+                // All clips of a file share the rest poses of nodes. If a node rests in another pose in this clip, it
+                // gets a key.
                 if key != resting && key != -resting {
                     channels.rotation = Some(ChannelInterpolation::Linear);
                 }
@@ -673,7 +678,7 @@ impl StackFollower<'_> {
             if keys[channel].is_some() {
                 continue;
             }
-            // Channels with keys at the same times are evaluated together.
+            // If channels have keys at the same times, they are evaluated together.
             let group: Vec<usize> = (channel..3)
                 .filter(|&other| lists[other] == lists[channel])
                 .collect();
@@ -888,14 +893,14 @@ impl<'a> Evaluator<'a> {
             Unfollowed::TooManyKeys => (
                 Code::Memory,
                 format!(
-                    "the curves of `{name}` need more than {} keys, for which an input of this length gets no memory; \
-                     is an angle damaged?",
+                    "the curves of `{name}` need more than {} keys, more than the memory limit for an input of this \
+                     length allows; is an angle damaged?",
                     self.follower.max_keys
                 ),
             ),
             Unfollowed::TooMuchWork => (
                 Code::FbxWork,
-                "following the curves takes more work than a file of this length gets; is it damaged?"
+                "following the curves takes more work than is allowed for a file of this length; is it damaged?"
                     .to_owned(),
             ),
         };

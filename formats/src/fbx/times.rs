@@ -73,7 +73,7 @@ pub(super) struct Takes {
     pub(super) others: Vec<String>,
     /// The key times of all curves, a list for each, unless it is that of the curve before.
     pub(super) keys: Vec<Vec<f64>>,
-    /// The rate of these, as in every format: whatever the file says.
+    /// The rate of the key times, found as in every format. The rate that the file states is not used.
     pub(super) rate: Option<FrameRate>,
     /// The frames to which key times belong: those of the file's rate if all keys lie on them.
     pub(super) grid: Option<FrameRate>,
@@ -321,7 +321,7 @@ impl ChannelTimes {
         if keys.len() < 2 {
             return Ok(0);
         }
-        // Curves of one property mostly have keys at the same times.
+        // The curves of a property usually have keys at the same times.
         let is_known = self.list.len() == keys.len()
             && self
                 .list
@@ -341,7 +341,8 @@ impl ChannelTimes {
             };
             is_constant(&pair[0]) || pair[1].time - pair[0].time < 2.0 * SAME
         });
-        // Whole turns between two keys would not show at a few times between them.
+        // If an angle changes by whole turns between two keys, a few samples between them would not show it. So there
+        // is a sample for each LARGEST_STEP.
         for pair in keys.windows(2).filter(|_| is_angle) {
             let parts = ((pair[1].value - pair[0].value).abs() / LARGEST_STEP).ceil();
             let parts = parts.min(MAX_PARTS) as usize;
@@ -375,7 +376,7 @@ impl ChannelTimes {
             };
             let periods = (overflow / duration).ceil().min(max_periods);
             let count = periods * keys.len() as f64;
-            // Refused by the number of bytes, before anything is allocated.
+            // Check the number of bytes before anything is allocated.
             let bytes = if count > REPEATED {
                 usize::MAX
             } else {
@@ -402,7 +403,7 @@ impl ChannelTimes {
     }
 
     fn append(&mut self, other: &Self, budget: &Budget) -> Result<(), OverBudget> {
-        // Curves of one node mostly have keys at the same times.
+        // The curves of a node usually have keys at the same times.
         if self.list != other.list {
             budget.take(other.list.len(), size_of::<f64>())?;
             self.list.extend_from_slice(&other.list);

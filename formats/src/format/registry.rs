@@ -109,7 +109,7 @@ impl Format {
 /// line is the header of a `.dat` file.
 fn table_width(start: &[u8]) -> Option<usize> {
     let start = start.strip_prefix(b"\xef\xbb\xbf").unwrap_or(start);
-    // The last line may be cut.
+    // The end of the start may be in the middle of a line, which is ignored.
     let whole = start.iter().rposition(|&byte| byte == b'\n')?;
     let text = std::str::from_utf8(&start[..whole]).ok()?;
     let header = text.lines().next()?.trim_start().strip_prefix('#');

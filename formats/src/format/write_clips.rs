@@ -88,7 +88,7 @@ pub(crate) fn no_offsets(clip: &Motion, options: &MotionOptions) -> Option<Diagn
 
 /// Refuses samples whose times do not increase: no reader of clips takes such a file.
 pub(crate) fn check_times(sampled: &SampledClip<'_>, name: &str) -> Result<(), Diagnostic> {
-    // If keys are written instead of samples, `sampled.times` is empty.
+    // If keys are written instead of samples, `sampled.times` is empty, and nothing is checked.
     let mut pairs = sampled.times.windows(2).filter(|_| !sampled.is_at_keys);
     let Some(sample) = pairs.position(|pair| pair[1] <= pair[0]) else {
         return Ok(());
@@ -165,7 +165,7 @@ fn no_room(
 ) -> Option<Diagnostic> {
     let missing = Feature::ALL.into_iter();
     let missing = missing.filter(|feature| !format.features.contains(feature));
-    // Where times begin at 0, another warning says that they are moved.
+    // If the format has no start, another warning reports that the times are shifted.
     let has_start = format.supports(Feature::Start);
     let missing = missing.filter(|feature| has_start || *feature != Feature::Nanoseconds);
     let left_out: Vec<&str> = missing
@@ -195,7 +195,7 @@ fn loss(
     let joints = || clip.skeleton.iter();
     let (has_it, loss) = match feature {
         Feature::TrackNames => {
-            // This name was not in the file: readers of trajectories add it, so leaving it out loses nothing.
+            // Readers of trajectories add this name, so it was not in the file, and nothing is lost without it.
             let named = |name: Option<&str>| {
                 name.is_some_and(|name| !name.is_empty() && name != TRAJECTORY_TRACK)
             };
@@ -229,8 +229,8 @@ fn loss(
         ),
         Feature::Curves => (
             are_keys(sampled) && bends_by(clip, None),
-            "the smooth curves between the keys (it has lines and arcs; with more frames they are nearer to the \
-             curves)",
+            "the smooth curves between the keys (the format has lines and arcs; with more frames they are nearer to \
+             the curves)",
         ),
         Feature::Bvh => (
             !clip.written_joints.is_empty() && !clip.is_world,

@@ -94,7 +94,7 @@ pub(super) fn read(
     let mut keys: Vec<ChannelKeys> = Vec::new();
     let mut borrowed = Vec::new();
     for moved in &moved {
-        // Keys are in memory twice until they are moved into the set.
+        // Keys exist twice in memory until they are moved into the set.
         let count = times[&moved.sampler.input].len();
         borrowed.push(reader.borrow(count, moved.key_bytes(), &pointer)?);
         reader.take(count, moved.key_bytes(), &pointer)?;
@@ -170,7 +170,7 @@ pub(super) fn read(
                 .refuse(&moved.output, Code::NotFinite, error.to_string())
         })?;
     }
-    // Joints that another program has placed since are where it says.
+    // Joints without offsets: the file may state why their poses in the world are unknown.
     if motion.has_unplaced_joints() && motion.no_world.is_none() {
         motion.no_world = animation.extras.and_then(no_world);
     }

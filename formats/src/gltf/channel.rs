@@ -226,7 +226,7 @@ impl MovedChannel {
                     half_turns(&mut unit, warnings, &at_output);
                 }
                 let tangents = keys().filter(|_| is_cubic).map(|key| {
-                    // A key that is brought to norm 1 takes its tangents along.
+                    // If a key is scaled to norm 1, its tangents are scaled by the same factor.
                     let norm = dot(stored[key], stored[key]).sqrt();
                     let norm = if (norm - 1.0).abs() <= UNIT_TOLERANCE {
                         1.0

@@ -121,7 +121,7 @@ impl Document for GltfDocument {
             .filter_map(|(animation, index, raw)| {
                 let channel: Channel = serde_json::from_str(raw.get()).ok()?;
                 let is_read = match channel.target.moves() {
-                    // Those of a node without morph targets are not.
+                    // Weights of a node without morph targets are not read.
                     Some((_, TargetPath::Weights)) => self.reads(animation, index),
                     moved => moved.is_some(),
                 };

@@ -83,7 +83,7 @@ impl<'a> Edits<'a> {
             None => self.json.range(object).start,
         };
         let end = self.json.range(value).end;
-        // Between a value and the next there is one name.
+        // Between two values of an object there is exactly one name.
         let quote = self.json.text[start..end].find('"').unwrap_or(0);
         self.list.push((start + quote..end, with));
     }

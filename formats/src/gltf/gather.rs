@@ -28,7 +28,7 @@ pub(super) fn buffers<'a>(
     let mut members = None;
     let mut kept = Vec::new();
     let mut is_first_unnamed = false;
-    // For each buffer, its new index and how far its bytes moved.
+    // For each buffer: its new index, and the offset by which its bytes moved.
     let mut moves: Vec<(usize, usize)> = Vec::new();
     for (index, raw) in json.entries("buffers").iter().enumerate() {
         let pointer = format!("/buffers/{index}");
@@ -154,7 +154,7 @@ pub(super) fn images<'a>(
     data: &mut BufferData<'_>,
 ) -> Result<(), Diagnostic> {
     let json = reader.json;
-    // glTF itself has PNG and JPEG; others are for textures of extensions.
+    // glTF without extensions has only PNG and JPEG. Other types belong to extensions of textures.
     let textures: Vec<Texture> = json.optional("textures");
     let plain: HashSet<usize> = textures
         .iter()

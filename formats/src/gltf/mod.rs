@@ -212,7 +212,7 @@ pub fn read_gltf(
             Err(fault) if fault.code == Code::Memory => return Err(fault),
             Err(fault) => {
                 read.push(None);
-                // Animations that share a broken buffer have one fault.
+                // If several animations use one damaged buffer, it is reported once.
                 match faults.entry((fault.location.clone(), fault.message.clone())) {
                     Entry::Occupied(known) => loaded.refused[*known.get()].count += 1,
                     Entry::Vacant(new) => {

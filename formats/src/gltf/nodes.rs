@@ -211,7 +211,7 @@ fn parents(json: &Json<'_>, list: &[Node]) -> Result<Vec<Option<usize>>, Diagnos
             }
         }
     }
-    // The number of the walk that visited each node, from 1.
+    // For each node, the number of the traversal that visited it, from 1.
     let mut walks = vec![0; list.len()];
     for start in 0..list.len() {
         let mut next = Some(start);

@@ -501,7 +501,7 @@ impl<'a> Layout<'a> {
         let has_bin = has_bin
             .transpose()?
             .is_some_and(|buffer| buffer.uri.is_none());
-        // The views of which a part is left out: all that refers to them are plain accessors.
+        // Views of which only a part is removed. This requires that only plain accessors refer to them.
         let mut parted: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
         let (mut is_losing, mut is_whole) = (BTreeSet::new(), BTreeSet::new());
         is_whole.extend(references.views.iter().map(|view| view.index));
@@ -801,7 +801,7 @@ mod tests {
         let both = layout(&[8..16, 40..48], &[]).cut(60);
         let moved = [0, 8, 12, 16, 20, 48, 60].map(|offset| both.moved(offset));
         assert_eq!(moved, [0, 8, 8, 8, 12, 32, 44]);
-        // The chunk is written in parts, wherever they end.
+        // The chunk may be written in two parts that are divided anywhere.
         let bytes: Vec<u8> = (0..60).collect();
         let left: Vec<u8> = [0..8, 16..40, 48..60].into_iter().flatten().collect();
         for end in 0..=60 {
@@ -826,7 +826,7 @@ mod tests {
                 r#"{"extensions":{"VRM":{"extensions":{"\"{\\":[{"extensions":{"VRM":5}},-6,1.5]}}}}"#,
                 Some(5),
             ),
-            // Whole numbers may have a point and an exponent.
+            // A whole number may be written with a point and an exponent.
             (r#"{"extensions":{"X":[1,2.0e1]}}"#, Some(20)),
         ] {
             assert!(serde_json::from_str::<serde_json::Value>(text).is_ok());

@@ -92,7 +92,7 @@ mod tests {
                 let found = Quantization::Filtered(steps).read_back(q).as_dquat();
                 let q = q.as_dquat();
                 let off = 2.0 * (found - q).length().min((found + q).length());
-                // Half a step in each of three components, and the error that this causes in the largest.
+                // Half a step in each of three components, and the resulting error of the largest component.
                 let limit = 2.0 * 2.0 * 0.5 / f64::from(steps) + 1e-4;
                 assert!(off < limit, "{steps} {q} {off:e}");
             }

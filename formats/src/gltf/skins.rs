@@ -73,7 +73,7 @@ impl CarriedMeshBuilder<'_, '_> {
             Some(skin) => self.add_bones(skin, index)?,
             None => match self.carrier(index)? {
                 Some(bone) => self.mesh.bones.push(bone),
-                // Nothing of the clip moves it.
+                // The clip has no keys for it.
                 None => return Ok(()),
             },
         }
@@ -171,7 +171,7 @@ impl CarriedMeshBuilder<'_, '_> {
                 let weights = self.reader.numbers(weights, &accessor, 4, &from)?;
                 (joints, weights)
             }
-            // Without weights, the first joint carries the whole mesh.
+            // If there are no weights, the whole mesh moves with the first joint.
             _ => {
                 let all = |first: f64| [first, 0.0, 0.0, 0.0].repeat(count);
                 (vec![0; count * 4], all(1.0))

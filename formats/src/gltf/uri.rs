@@ -53,14 +53,14 @@ pub(super) fn of_bytes(bytes: &[u8]) -> String {
 pub(super) fn relative(uri: &str) -> Result<PathBuf, String> {
     if let Some(scheme) = scheme(uri) {
         return Err(format!(
-            "`{uri}` is not followed, for it begins with `{scheme}:`; put the file beside this one"
+            "`{uri}` is not followed, for it begins with `{scheme}:`; put the file into the folder of this one"
         ));
     }
     let text = String::from_utf8(percent_decoded(uri)?)
         .map_err(|_| format!("`{uri}` is not UTF-8 once decoded"))?;
     if text.starts_with('/') {
         return Err(format!(
-            "`{uri}` is an absolute path, which is not followed; put the file beside this one"
+            "`{uri}` is an absolute path, which is not followed; put the file into the folder of this one"
         ));
     }
     if text.contains(['\\', '\0']) || scheme(&text).is_some() {
@@ -76,7 +76,7 @@ pub(super) fn relative(uri: &str) -> Result<PathBuf, String> {
                 if !path.pop() {
                     return Err(format!(
                         "`{uri}` leads out of the file's folder and is not followed; put the file \
-                         beside this one"
+                         into this folder"
                     ));
                 }
             }

@@ -147,7 +147,8 @@ fn moved_starts(clips: &[SampledClip<'_>], options: &MotionOptions) -> Vec<Diagn
         if offset != 0 {
             warnings.warn(Code::StartMoved, || {
                 let message = format!(
-                    "times are relative to {offset} s, because f32, in which glTF has times, cannot store the full times"
+                    "times are relative to {offset} s, because glTF stores times in f32, which cannot hold the full \
+                     times"
                 );
                 (None, message)
             });
@@ -308,7 +309,8 @@ pub(super) fn f32_times(tracks: usize, seconds: &[f64]) -> Result<Vec<f32>, (Cod
     }
     if first < 0.0 {
         let why = format!(
-            "its first sample is at {} s, and times in glTF begin at 0; `tumble convert --start 0` cuts what is before",
+            "its first sample is at {} s, and times in glTF begin at 0; `tumble convert --start 0` cuts the part \
+             before",
             seconds[0]
         );
         return Err((Code::TimesBelowZero, why));
@@ -316,14 +318,14 @@ pub(super) fn f32_times(tracks: usize, seconds: &[f64]) -> Result<Vec<f32>, (Cod
     if !last.is_finite() {
         let time = seconds[seconds.len() - 1];
         let why = format!(
-            "{time} s is beyond f32, in which glTF has times; --end SECONDS ends it before"
+            "{time} s is too large for f32, in which glTF stores times; --end SECONDS ends the clip before"
         );
         return Err((Code::TimesInF32, why));
     }
     if let Some(index) = times.windows(2).position(|pair| pair[0] >= pair[1]) {
         let spacing = f64::from(last.next_up()) - f64::from(last);
         let why = format!(
-            "{} s and {} s are one time in f32, in which glTF has times; there f32 has a time every {spacing} s: give \
+            "{} s and {} s are the same time in f32, in which glTF stores times; its step there is {spacing} s: give \
              --fps {} or less",
             seconds[index],
             seconds[index + 1],
@@ -354,7 +356,7 @@ fn animation<'a>(
             }
         }
     }
-    // An animation has a channel at least, and lasts as long as its channels.
+    // An animation needs at least one channel; its length is that of its channels.
     if channels.is_empty() {
         channels.push((0, Property::Rotation, "LINEAR"));
     }

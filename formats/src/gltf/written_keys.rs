@@ -34,7 +34,7 @@ impl WrittenKeys {
                 let sampler = samplers.map(|channels| channels.scale);
                 Self::of_vectors(clip, track, Channel::Scale, sampler)
             }
-            // They belong to no track.
+            // Weights do not belong to a track.
             TargetPath::Weights => None,
         }
     }
@@ -88,7 +88,7 @@ impl WrittenKeys {
         );
         let mut values = Vec::new();
         let mut keys = rotations.keys.to_vec();
-        // The signs of cubics are part of their curves.
+        // The tangents of cubics depend on the signs of the keys, so these signs are kept.
         if sampler != ChannelInterpolation::Cubic {
             continue_signs(&mut keys, 1);
         }

@@ -52,7 +52,7 @@ pub fn twist_heading(rotation: DQuat, ground: Ground) -> f64 {
         Ground::Y => rotation.y,
         Ground::Z => rotation.z,
     };
-    // The rotation and its negative have one heading.
+    // A quaternion and its negative are the same rotation, so they must have the same heading.
     let (along, w) = match rotation.w < 0.0 {
         true => (-along, -rotation.w),
         false => (along, rotation.w),

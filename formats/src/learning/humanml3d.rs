@@ -194,7 +194,8 @@ fn canonical(positions: &[Frame]) -> Result<Vec<Frame>, Humanml3dError> {
 
 /// The rotation of the root that makes each frame face +z; none in the first.
 fn root_rotations(frames: &[Frame]) -> Result<Vec<DQuat>, Humanml3dError> {
-    // The hips are swapped; see `humanml3d`. A tilted direction is shorter across the ground, and counts less.
+    // The hips are swapped; see `humanml3d`. If the body is tilted, this direction has a shorter component on the
+    // ground and has less weight.
     let facing = |(frame, joints): (usize, &Frame)| {
         let across =
             (joints[HIPS[0]] - joints[HIPS[1]]) + (joints[SHOULDERS[1]] - joints[SHOULDERS[0]]);

@@ -56,7 +56,7 @@ fn swapped(name: &str, side: &str, other: &str) -> Option<String> {
         let (before, after) = (&name[..at], &name[at + side.len()..]);
         let (before, after) = (before.chars().next_back(), after.chars().next());
         if side.starts_with(char::is_lowercase) && side.len() > 2 {
-            // `left` in `cleft` is no side.
+            // `left` in `cleft` does not name a side.
             return !before.is_some_and(char::is_alphanumeric);
         }
         match side {

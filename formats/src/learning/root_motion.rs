@@ -149,7 +149,8 @@ impl RootMotion {
         (back * (position - self.positions[frame]), back * rotation)
     }
 
-    /// Adds this motion to a pose: the inverse of [`RootMotion::in_place`], to within 1e-15 of the numbers.
+    /// Adds this motion to a pose: the inverse of [`RootMotion::in_place`]. For positions within a few units
+    /// of 0, both together change a pose by less than 1e-14.
     ///
     /// # Panics
     /// When there is no such frame.
@@ -229,7 +230,7 @@ mod tests {
                     assert!((back - position).length() < 1e-14);
                     assert!((rotated - rotation).length() < 1e-14);
                 }
-                // The tilt does not turn: the heading turns by a third of a turn, beyond half a turn without a jump.
+                // The tilt is constant. The heading changes by a third of a turn and passes half a turn without a jump.
                 let change = motion.headings[30] - motion.headings[0];
                 let steps = motion.headings.windows(2);
                 assert!(
@@ -261,7 +262,7 @@ mod tests {
                 let now = motion.after_loops(loops);
                 assert!((now.positions[0] - before.positions[12]).length() < 1e-14);
                 assert!((now.headings[0] - before.headings[12]).abs() < 1e-14);
-                // The shape of the path stays.
+                // The shape of the path does not change.
                 let step =
                     |motion: &RootMotion| (motion.positions[5] - motion.positions[2]).length();
                 assert!((step(&now) - step(&motion)).abs() < 1e-14);
@@ -280,7 +281,7 @@ mod tests {
             assert!((before.positions[12] - motion.positions[0]).length() < 1e-14);
             assert!((before.headings[12] - motion.headings[0]).abs() < 1e-14);
         }
-        // Straight ahead, each loop is as far as the first.
+        // On a straight path, all loops have the same length.
         let (positions, rotations) = ([DVec3::ZERO, DVec3::X], [DQuat::IDENTITY; 2]);
         let ahead = RootMotion::of(&positions, &rotations, Ground::Z, HeadingSource::X);
         assert_eq!(

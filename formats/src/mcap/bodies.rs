@@ -120,7 +120,7 @@ fn names(bodies: &[Body<'_>]) -> Vec<String> {
     bodies.iter().enumerate().map(name).collect()
 }
 
-/// Replaces stamps of 0 where they stand for no time, and finds transforms that are static.
+/// Replaces stamps of 0 by log times if they mean that there is no stamp, and finds static transforms.
 fn resolve_stamps(bodies: &mut [Body<'_>]) {
     let mut is_stamped: HashMap<usize, bool> = HashMap::new();
     for body in &*bodies {
@@ -136,7 +136,7 @@ fn resolve_stamps(bodies: &mut [Body<'_>]) {
                     .iter_mut()
                     .for_each(|pose| pose.time = pose.logged);
             }
-            // Others in its topic have stamps.
+            // All stamps of this transform are 0, but others in its topic have stamps: it is static.
             _ if all_zero && body.frames.is_some() => body.kind = BodyKind::Static,
             _ => {
                 let mut stamps = body.poses.iter().filter(|pose| pose.time != 0);
@@ -223,8 +223,7 @@ fn warn_of_clocks(bodies: &[Body<'_>], warnings: &mut Warnings) {
     warnings.warn(Code::McapClocks, || {
         let (others, log) = (list(of_others), list(of_log));
         let message = format!(
-            "the times of {others} are of another clock than those of {log}; they are not related: choose tracks of \
-             one clock by --tracks"
+            "the times of {others} come from another clock than those of {log}; choose tracks of one clock by --tracks"
         );
         (None, message)
     });
@@ -281,7 +280,7 @@ pub(super) fn into_loaded(
         ..Motion::default()
     };
     if !options.raw_times {
-        // Nothing follows from the times of transforms that stay.
+        // The times of static transforms have no meaning, so they do not determine the rate.
         let mut timed: Vec<&mut BodyKeys> = all
             .iter_mut()
             .filter(|keys| keys.kind != BodyKind::Static)
@@ -376,8 +375,8 @@ fn keys(
     if let TimeOrder::Reset { row } = time_order(&stamps) {
         let [before, time] = [row - 1, row].map(|row| stamps[row] as f64 / SECOND as f64);
         let message = format!(
-            "the clock of `{name}` was set back from {before} s to {time} s; what was recorded before and after does \
-             not belong to one time: cut the log there"
+            "the clock of `{name}` was set back from {before} s to {time} s; the parts before and after do not belong \
+             together: cut the log there"
         );
         return Err(body.refuse(file, row, Code::TimeNotIncreasing, message));
     }

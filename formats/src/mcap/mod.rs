@@ -395,7 +395,7 @@ impl<'a> Log<'a> {
             MessageKind::QuaternionStamped | MessageKind::Imu => {
                 let (stamp, _) = cdr.header()?;
                 let rotation = cdr.rotation()?;
-                // By REP 145, a sensor without an orientation writes this.
+                // By REP 145, a sensor without an orientation writes -1 here.
                 if kind == MessageKind::Imu && cdr.real()? == -1.0 {
                     return Err(MessageFault::NoOrientation);
                 }
@@ -426,7 +426,7 @@ impl<'a> Log<'a> {
                 cdr.header()?;
                 let count = cdr.count()?;
                 let body = self.body_of_topic(topic, BodyKind::Path)?;
-                // A path is sent anew as a whole; the memory of the one before is given back first.
+                // Each message of a path replaces the path before. Its memory is released first.
                 let path = &mut self.bodies[body];
                 (path.poses, path.borrowed) = (Vec::new(), None);
                 let borrowed: Borrowed<'a> = self.budget.borrow(count, POSE)?;

@@ -165,8 +165,8 @@ impl<'a> Records<'a> {
                     Self::warn_cut(
                         warnings,
                         self.bytes.len() as u64,
-                        "the log was not finished: its end is missing, as of a recording that was interrupted; \
-                         everything that is there is read",
+                        "the end of the log is missing, for example because the recording was interrupted; everything \
+                         before is read",
                     );
                 }
                 return Ok(None);
@@ -264,7 +264,7 @@ impl<'a> Records<'a> {
                     (self.chunk, self.chunk_offset, self.chunk_at) = (chunk, offset, 0);
                     self.borrowed = Some(borrowed);
                 }
-                // An index and a summary follow; they only repeat the channels.
+                // The rest of the file is an index and a summary, which only repeat the channels.
                 DATA_END if !in_chunk => {
                     self.at = self.bytes.len();
                     self.is_complete = true;

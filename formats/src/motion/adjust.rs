@@ -120,7 +120,8 @@ pub fn adjust(clip: &Motion, scale: f64, rotation: DQuat) -> Result<Motion, Trac
         let exactly = |vector: DVec3| rotation * (vector * scale);
         let moved = |vector: Vec3| exactly(vector.as_dvec3()).as_vec3();
         let before = clip.origin(index);
-        // Whole numbers, which f64 adds exactly, where these are as near to the positions as before.
+        // Far from 0, origins are rounded to whole numbers, which f64 adds exactly. Positions are then as near to the
+        // origin as before.
         let origin = exactly(before);
         let origin = DVec3::select(
             origin.abs().cmpge(DVec3::splat(16.0)),
@@ -317,7 +318,7 @@ impl JointOffsets {
             let plain = line.split('#').next().unwrap_or_default().replace(',', " ");
             let parts: Vec<(u64, &str)> = tokens(&plain).collect();
             let mut read = parts.as_slice();
-            // A name with blanks has more than one part.
+            // The name of a joint may contain blanks, so it may have several parts.
             if let [named @ .., _, _, _] = read
                 && let ([(_, first), ..], true) = (named, numbers.len() == 3 * names.len())
                 && number::parse(first).is_err()

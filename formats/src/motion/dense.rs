@@ -14,7 +14,7 @@ impl Motion {
         let mut times: Vec<f64> = Vec::new();
         let mut last: Option<&[f64]> = None;
         for list in self.key_lists() {
-            // Tracks mostly share their times.
+            // Tracks usually share their times.
             if last != Some(list) {
                 times.extend_from_slice(list);
                 last = Some(list);

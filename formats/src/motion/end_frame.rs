@@ -62,8 +62,8 @@ impl EndSample {
         self.is_held().then(|| {
             let [at, time] = [self.at, self.time].map(|time| clock_text(time_offset, time));
             let message = format!(
-                "the clip ends at {at} s, between two frames of {rate} a second; one frame more, at {time} s, has \
-                 the value of the end (--end-frame leave-out ends before it)"
+                "the clip ends at {at} s, between two frames at {rate} fps; one more frame, at {time} s, has \
+                 the value of the end (--end-frame leave-out omits it)"
             );
             Diagnostic::new(name, Code::EndHeld, message)
         })
@@ -96,8 +96,7 @@ impl EndFrame {
             Self::Key => end,
             Self::Hold => {
                 let next = timeline.time(0, 0)? + rate.time_of(timeline.len() as u64);
-                // The start of the samples may be between two frames, if the file is written again with its other
-                // content.
+                // If the file is written again with its other content, the first sample may be between two frames.
                 let frames = (next - last) * rate.per_second();
                 match (frames - 1.0).abs() <= ON_FRAME {
                     true => next,
@@ -331,7 +330,7 @@ mod tests {
                 let mut found = Vec::new();
                 for rows in rows.chunks(part) {
                     let next = ends.next(rows);
-                    // Nothing is copied where no end follows.
+                    // If no end frame is added, nothing is copied.
                     assert_eq!(matches!(next, Cow::Borrowed(_)), next.len() == rows.len());
                     found.extend_from_slice(&next);
                 }

@@ -23,8 +23,8 @@ pub(crate) fn restore(lists: &mut [Vec<f64>], precision: Precision) -> Option<Fr
         let found =
             common.or_else(|| of(&RateSource::Times(std::slice::from_ref(list), precision)));
         let Some(found) = found else { continue };
-        // For frames relative to an arbitrary first time, the exact time is not nearer than the f64 time, so such
-        // times are kept.
+        // If frames are relative to an arbitrary first time, the exact frame time is not a better value than the time
+        // in f64, so such times are kept.
         let was_rounded = |&time: &f64| {
             let off = (time - frame_time(found.grid, found.phase, time)).abs();
             off > 2.0 * Precision::F64.rounding(time)

@@ -92,7 +92,7 @@ pub fn keys_for(
     };
     match keyed {
         Ok(mut samples) if !(is_kept && keys_per_channel) => {
-            // Those that the format leaves out may have other times.
+            // Scalars that the format cannot store may have other key times, so they are sampled at these times.
             if samples.scalars.is_empty() && clip.set.scalar_count() > 0 {
                 let (engine, times) = (Engine::new(Device::Cpu)?, samples.times.clone());
                 let (methods, frames) = (ChannelMethods::AUTHORED, SampleTimes::at(times));

@@ -149,7 +149,7 @@ pub fn with_root_motion(
     };
     let (positions, rotations): (Vec<DVec3>, Vec<DQuat>) = (0..frames).map(in_world).unzip();
     let motion = RootMotion::of(&positions, &rotations, options.ground, options.heading);
-    // The joint between the root and its parent, as it is stored.
+    // The pose of the joint between the root and its parent, rounded as it is stored.
     let carried = |frame: usize| {
         let parent = parents[frame];
         let moved = motion.restored(frame, parent.position, parent.rotation);
@@ -359,7 +359,7 @@ impl Carrier {
             all.written_joints.push(WrittenJoint::default());
         }
         all.is_world = false;
-        // The shape of an SMPL body says where its first joint is.
+        // The body shape of SMPL determines the position of the first joint, which is another joint now.
         all.body = None;
         all.robot = None;
         let order: Vec<usize> = std::iter::once(tracks).chain(0..tracks).collect();

@@ -74,7 +74,7 @@ mod tests {
     #[test]
     fn joints_keep_their_parents_and_their_keys() {
         let mut clip = Motion::default();
-        // A hand before the arm, its parent.
+        // A hand that comes before its parent, the arm.
         for (track, (name, parent)) in [
             ("hand", Some(1)),
             ("arm", Some(3)),

@@ -203,7 +203,7 @@ impl Alignment {
             Align::Yaw => v.with_z(0.0),
             _ => v,
         };
-        // The mean of equal numbers is rounded.
+        // The computed mean of equal numbers may differ from them by rounding.
         let extent = |poses: &[Pose], mean: DVec3| {
             let apart = poses[..count]
                 .iter()
@@ -248,7 +248,7 @@ impl Alignment {
             Align::Sim3 => {
                 let along: f64 = pairs().map(|(a, b)| a.dot(rotation * b)).sum();
                 let size: f64 = pairs().map(|(_, b)| b.length_squared()).sum();
-                // If the estimate does not move, every scale is possible, so it stays 1.
+                // If the estimate does not move, no scale can be determined, so it stays 1.
                 if size > 0.0 && along > 0.0 {
                     along / size
                 } else {
@@ -419,7 +419,7 @@ impl Errors {
         for end in 1..count {
             path += estimate[end].position.distance(estimate[end - 1].position);
             let is_end = match step {
-                // Times of decimals: 0.3 - 0.2 is less than 0.1.
+                // Times with decimals: in f64, 0.3 - 0.2 is less than 0.1.
                 Step::Seconds(seconds) => {
                     times[end] - times[start] >= seconds * (1.0 - 1e-9) - 1e-9
                 }

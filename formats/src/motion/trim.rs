@@ -25,8 +25,8 @@ pub enum TrimError {
     },
     /// A new key at a cut would need the tangents, velocities or tensions that the other keys have.
     #[error(
-        "track {track} (`{name}`) has tangents, velocities or tensions at its keys, and none lies at \
-         {time} s: cut at one of its keys, or sample it (`tumble eval --start --end`)"
+        "track {track} (`{name}`) has tangents, velocities or tensions at its keys, and no key is at {time} s: cut at \
+         one of its keys, or sample it (`tumble eval --start --end`)"
     )]
     NoKeyAtCut {
         /// Index of the first such track, from 0.
@@ -38,7 +38,7 @@ pub enum TrimError {
     },
     /// A new key of a scalar at a cut would need the tangents that its other keys have.
     #[error(
-        "the scalar `{name}` has tangents at its keys, and none lies at {time} s: cut at one of its keys, or sample it \
+        "the scalar `{name}` has tangents at its keys, and no key is at {time} s: cut at one of its keys, or sample it \
          (`tumble eval --start --end`)"
     )]
     NoScalarKeyAtCut {
@@ -94,7 +94,7 @@ pub fn trim(clip: &Motion, start: f64, end: f64, engine: &Engine) -> Result<Moti
         }
         let values = [cuts.rotations[index], cuts.rotations[tracks + index]];
         let (times, mut keys) = part.keys(track.times, track.keys, values);
-        // The sign in which the curve goes on.
+        // The sign with which the curve continues.
         for i in 1..keys.len() {
             if part.is_made(i) && signs_differ(keys[i - 1], keys[i]) {
                 keys[i] = -keys[i];
@@ -187,7 +187,7 @@ impl TrimmedKeys {
                 after: false,
             };
         }
-        // Where a channel only begins or ends in between, it is held as before.
+        // If a channel begins or ends inside the range, its value is held there, as before.
         let before = first > 0 && times.get(first).is_none_or(|&time| time > start);
         let after = behind < times.len()
             && (behind == 0 || times[behind - 1] < end)

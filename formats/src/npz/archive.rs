@@ -244,7 +244,7 @@ impl Archive {
         if header.element.size().is_none() || said.is_some() && said.map(|n| n as u64) == held {
             return Ok(header);
         }
-        // The archive's directory may be wrong itself.
+        // The sizes in the archive's directory may be wrong, so they are not trusted.
         let held = self.unpack(member)?.len().saturating_sub(header.start);
         let said = match said {
             Some(said) => format!("{said} bytes"),

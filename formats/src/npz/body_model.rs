@@ -69,7 +69,7 @@ pub fn body_offsets(path: &Path, clip: &Motion, limits: Limits) -> Result<Vec<f6
     let model = Model::read(&archive)?;
     let joints = model.joints(&archive, &shape.betas)?;
     let tracks = clip.skeleton.len();
-    // Models number their joints and do not name them, and all models begin with the joints of a body.
+    // Models number their joints instead of naming them, and all models begin with the same joints.
     let differs = |track: &usize| model.parents.get(*track) != Some(&clip.skeleton[*track].parent);
     if let Some(track) = (0..tracks).find(differs) {
         let called = |parent: Option<usize>| match parent {
@@ -112,7 +112,7 @@ fn of_gender(folder: &Path, gender: &str) -> Result<PathBuf, Diagnostic> {
         |message: String| Diagnostic::new(folder.display().to_string(), Code::BodyModel, message);
     let gender = if gender.is_empty() { "neutral" } else { gender };
     let found = ["npz", "pkl"].map(|ending| files_of_gender(folder, gender, ending));
-    // A folder that has the same models in both forms has them in the first.
+    // If a folder has a model in both formats, the first format is used.
     let found = found.into_iter().find(|found| !found.is_empty());
     match &found.unwrap_or_default()[..] {
         [only] => Ok(only.clone()),

@@ -44,7 +44,7 @@ pub(crate) fn read(
         .collect::<Result<_, _>>()?;
     archive.take(plan.tracks.saturating_mul(plan.frames), KEY)?;
     archive.take(plan.tracks, TRACK)?;
-    // There are as many frames as the arrays have bytes for.
+    // There cannot be more frames than the bytes of the arrays allow.
     let mut times = plan.read_times(archive, options)?;
     if let Some(message) = plan.two_rates.take() {
         warnings.warn(Code::TwoRates, || (None, message));
@@ -77,7 +77,7 @@ pub(crate) fn read(
             format!("the clip cannot be kept: {error}"),
         )
     };
-    // While the keys of some tracks go into the set, those of the next ones are read.
+    // While the keys of some tracks are added to the set, the keys of the next tracks are read.
     let at_once = TOGETHER * std::thread::available_parallelism().map_or(1, usize::from);
     let jobs = plan.parts.iter().zip(&arrays).flat_map(|(part, array)| {
         let starts = part.tracks.clone().step_by(at_once);
@@ -284,7 +284,7 @@ fn read_keys(
             array.tracks::<QuietWxyz, 4, _>(at, in_part.clone(), frames, quiet)
         }
         KeyKind::RotationVector => {
-            // A vector that jumps to the other side of π goes on on this side.
+            // If a rotation vector jumps to the other side of π, its quaternion is continued without a jump.
             let finish = |mut keys: Vec<Quat>| {
                 continue_signs(&mut keys, 1);
                 quiet(keys)
@@ -444,7 +444,7 @@ fn vectors(
         let bad = list.iter().position(|vector| !vector.is_finite());
         (origin, list, bad)
     };
-    // Positions in f32 have lost what an origin would keep.
+    // Positions in f32 have already lost the digits that an origin would keep.
     let has_origin = part.kind == KeyKind::Translation && array.header.element == Element::F64;
     let lists = match has_origin {
         true => array.tracks::<AsStored, 3, _>(part.at, in_part.clone(), frames, |list| {

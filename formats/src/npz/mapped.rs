@@ -155,7 +155,7 @@ fn part(
     check_float(archive, member)?;
     let header = archive.header(member)?;
     let (mut shape, mut strides) = (header.shape.clone(), header.strides());
-    // The rows of a matrix may be an axis apart, if one follows the other in memory.
+    // A matrix may be stored in two axes, if its rows follow each other in memory.
     if values == KeyKind::Form(RotationForm::Matrix)
         && let [.., 3, 3] = shape[..]
         && let [.., rows, columns] = strides[..]
@@ -188,8 +188,8 @@ fn part(
     let columns = entry.columns.clone().unwrap_or(0..last);
     if !(axes == 2 || axes == 3) || columns.end > last || columns.len() != width {
         let message = format!(
-            "the array has shape {}; {width} numbers a key are read, (frames, {width}) or with an \
-             axis of tracks, `[3:7]` chooses some of a longer axis",
+            "the array has shape {}; a key needs {width} numbers: (frames, {width}), or with an axis of tracks; \
+             `[3:7]` selects a part of a longer axis",
             shape_text(shape)
         );
         return Err(refuse(Code::Shape, message));

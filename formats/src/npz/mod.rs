@@ -111,7 +111,7 @@ pub fn read_npz(file: &str, bytes: Vec<u8>, options: &ReadOptions) -> Result<Loa
         }
         Ok((_, loaded)) => Ok(loaded),
         Err(error) => match error.code {
-            // The keys may be in arrays of objects; others are not looked at.
+            // If an archive has arrays of objects, they may contain the keys.
             Code::Pickled | Code::UnknownArrays | Code::Map if archive.has_objects() => {
                 read_with_objects(archive, options)
             }

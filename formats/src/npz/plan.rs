@@ -52,7 +52,7 @@ pub(crate) struct ArchivePlan {
     pub(crate) all_times: Vec<f64>,
     /// Members that repeat the data of others, or with which the rate is compared.
     pub(crate) compared: Vec<usize>,
-    /// Members that do not depend on frames, whatever their shape.
+    /// Members that do not depend on frames, even if their shape looks like it.
     pub(crate) constants: Vec<usize>,
     pub(crate) is_world: bool,
     /// Why poses in the world cannot be computed.

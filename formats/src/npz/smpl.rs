@@ -227,8 +227,8 @@ pub(crate) fn plan(
         if is_smpl && !has_more && !has(["pose_hand", "left_hand_pose"]) {
             Skeleton::of(SMPL_BODY + 1)
         } else if is_smpl {
-            let message = "`body_pose` has the 23 joints of SMPL, whose hands have no fingers and whose \
-                           head no face; the arrays of these are of another model";
+            let message = "`body_pose` has the 23 joints of SMPL, which has no fingers and no face; the arrays of \
+                           fingers and face belong to another model";
             return Err(Diagnostic::new(&archive.file, Code::UnknownArrays, message));
         } else {
             skeleton.face(

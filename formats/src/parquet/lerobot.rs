@@ -48,7 +48,7 @@ impl Info {
             {
                 let mut names = Vec::new();
                 collect(feature.get("names").unwrap_or(&Value::Null), &mut names);
-                // The names are used only if there are as many as numbers: those of images are names of axes.
+                // The names are used only if their number is that of the values. The names of images are names of axes.
                 if Some(names.len())
                     == feature
                         .pointer("/shape/0")

@@ -150,8 +150,8 @@ fn read_table(
     options: &ReadOptions,
 ) -> Result<(Table, TablePlan), Diagnostic> {
     let damaged = |error: &dyn Display| damaged(name, error);
-    // The types that Parquet itself has tell enough; a schema that a writer left beside them is one
-    // more thing that may be wrong.
+    // The types of Parquet itself are sufficient. The Arrow schema in the metadata is not read, because it may
+    // contradict them.
     let without_arrow = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
     let loaded =
         ArrowReaderMetadata::load(&bytes, without_arrow).map_err(|error| damaged(&error))?;
@@ -168,7 +168,7 @@ fn read_table(
     roots.dedup();
     check_pages(name, &bytes, loaded.metadata(), &roots, options.limits)?;
 
-    // Words stay in the dictionaries that they are stored in: names repeat.
+    // Texts stay in the dictionaries in which they are stored, because names repeat.
     let names = plan
         .columns
         .iter()
@@ -182,7 +182,7 @@ fn read_table(
         _ => Arc::clone(field),
     };
     let mut fields: Vec<Arc<Field>> = fields.iter().enumerate().map(with_dictionary).collect();
-    // Only that schema tells durations from other whole numbers.
+    // Only the Arrow schema distinguishes durations from other whole numbers.
     let is_time = |column: &&RequestedColumn| column.need == ColumnNeed::Time;
     if let Some(time) = plan.columns.iter().find(is_time)
         && *fields[time.index].data_type() == DataType::Int64
@@ -198,7 +198,7 @@ fn read_table(
     let requested: Vec<(&RequestedColumn, &DataType)> = requested
         .map(|column| (column, fields[column.index].data_type()))
         .collect();
-    // Refuses types before anything is decoded.
+    // Types are refused before any column is decoded.
     let gather = Gather::new(name, requested.iter().copied())?;
     let with_schema = ArrowReaderOptions::new().with_schema(Arc::new(Schema::new(fields.clone())));
     let metadata = ArrowReaderMetadata::try_new(Arc::clone(loaded.metadata()), with_schema)
@@ -208,7 +208,7 @@ fn read_table(
         metadata,
         name,
     };
-    // Faults between columns are found by reading them side by side.
+    // If columns are damaged or do not agree, they are read together: this finds the first error by row.
     let table = match file.read_apart(&requested) {
         Some(table) => table,
         None => file.read_together(&requested, gather)?,

@@ -15,7 +15,7 @@ use crate::parquet::thrift::{Compact, INTEGER, STRUCT};
 /// have 100 bytes, but the times beside them differ and need a byte each.
 const MAX_NUMBERS_PER_BYTE: u64 = 1024;
 
-/// The largest length of a page that is allowed whatever its compressed length. Writers begin a new page after 1 MiB.
+/// Up to this length, a page is allowed without a look at its compressed length. Writers begin a new page after 1 MiB.
 const FREE_PAGE: u64 = 16 << 20;
 
 /// The largest ratio of the length of a longer page to its compressed length.
@@ -105,7 +105,7 @@ fn check_compression(name: &str, path: &str, found: Compression) -> Result<(), D
         | Compression::ZSTD(_) => Ok(()),
         other => {
             let found = other.to_string();
-            // Its level is written behind it.
+            // The text of a compression may contain its level in parentheses, which is cut off.
             let found = found.split('(').next().unwrap_or_default();
             let message = format!(
                 "column `{path}` is compressed by {found}; write it with snappy, zstd or LZ4"
@@ -197,7 +197,7 @@ mod tests {
         for end in 0..18 {
             assert!(page(&HEADER[..end]).is_none(), "{end}");
         }
-        // A list of 2^60 structs; structs in structs; a string beyond the end.
+        // A list of 2^60 structs, structs in structs, and a string that ends beyond the data.
         let list = [
             0x19, 0xfc, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0x0f, 0x00,
         ];

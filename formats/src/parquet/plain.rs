@@ -108,7 +108,7 @@ mod tests {
             page.extend_from_slice(b"values");
             page
         };
-        // One run of 300, and runs of 100 and 200.
+        // One run of 300 values, then runs of 100 and of 200.
         for levels in [&[0xd8, 0x04, 1][..], &[0xc8, 0x01, 1, 0x90, 0x03, 1]] {
             assert_eq!(behind_levels(&page(levels), 300), Some(&b"values"[..]));
             assert_eq!(behind_levels(&page(levels), 301), None);
@@ -117,7 +117,7 @@ mod tests {
             &[][..],
             &[0xd8],
             &[0xd8, 0x04],
-            // A run of nulls, one of no length, bits that are packed, a number that does not end.
+            // A run of nulls, a run of length 0, packed bits, and a number without an end.
             &[0xd8, 0x04, 0],
             &[0x00, 1, 0xd8, 0x04, 1],
             &[0x03, 0xff],

@@ -20,7 +20,7 @@ pub(super) fn check_schema(metadata: &[u8]) -> Result<(), String> {
             continue;
         }
         let (count, kind) = input.list().ok_or_else(damaged)?;
-        // How many of the columns of each open group are still to come.
+        // The number of columns that are still missing in each open group.
         let mut open: Vec<u64> = Vec::new();
         for read in 1..=count {
             let columns = columns_of(&mut input, kind).ok_or_else(damaged)?;
@@ -87,7 +87,7 @@ mod tests {
         [b"PAR1", &*metadata, &length, b"PAR1"].concat()
     }
 
-    /// Deeper than a thread's stack, or with more columns than there are.
+    /// Schemas that are nested deeper than a thread's stack allows, or that state more columns than they have.
     #[test]
     fn schemas_that_are_too_deep_are_refused() {
         let refusal =

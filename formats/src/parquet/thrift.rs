@@ -85,11 +85,11 @@ impl Compact<'_> {
                 let (count, kind) = self.list()?;
                 for _ in 0..count {
                     match kind {
-                        // In a list, truth values take a byte.
+                        // In a list, each truth value takes a byte.
                         TRUE | FALSE => self.at += 1,
                         kind => self.skip(kind, depth + 1)?,
                     }
-                    // Every item has a byte at least, so that a count costs no more than its bytes.
+                    // Every item takes at least a byte, so a wrong count cannot cost more time than the bytes.
                     self.bytes.get(self.at - 1)?;
                 }
             }

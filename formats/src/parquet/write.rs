@@ -34,7 +34,7 @@ impl<'a> ParquetSink<'a> {
             .set_max_row_group_row_count(Some(GROUP))
             .set_key_value_metadata(Some(notes.collect()))
             .set_statistics_enabled(EnabledStatistics::Chunk)
-            // Numbers of rotations hardly repeat; names do.
+            // Numbers of rotations hardly repeat, so a dictionary would not help. Names repeat.
             .set_dictionary_enabled(false)
             .set_column_dictionary_enabled(ColumnPath::from("track"), true)
             .set_column_dictionary_enabled(ColumnPath::from("clip"), true);

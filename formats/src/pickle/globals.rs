@@ -225,7 +225,7 @@ impl Class {
             .iter()
             .any(|start| module.starts_with(start))
             || REFUSED.contains(&first);
-        // Python follows the dots of a name to a class's members.
+        // In Python, dots in a name lead to members of a class.
         if is_refused || name.contains('.') {
             return Err(format!(
                 "it names {class}, which Python would run; only numbers, texts and arrays are \

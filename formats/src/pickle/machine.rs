@@ -216,7 +216,7 @@ impl<'a> Machine<'a> {
                     return Err(self.refuse(Code::PickleForm, message));
                 }
             }
-            // Frames only say how many bytes Python is to read ahead.
+            // A frame only states how many bytes Python should read ahead.
             0x95 => {
                 self.array::<8>()?;
             }
@@ -371,7 +371,7 @@ impl<'a> Machine<'a> {
                 let key = self.pop()?;
                 self.extend(&[key, value])
             }
-            // b'e', b'u', 0x90
+            // The remaining opcodes: b'e', b'u', 0x90.
             _ => {
                 let items = self.pop_mark()?;
                 self.extend(&items)
@@ -464,8 +464,8 @@ impl<'a> Machine<'a> {
             }
             b'P' | b'Q' => Err(self.refuse(
                 Code::PickleForm,
-                "a value lies in another file (a persistent id), which only files of torch.save \
-                 contain with it; save the values themselves"
+                "a value is in another file (a persistent id); only files of torch.save contain such values: save the \
+                 values themselves"
                     .to_owned(),
             )),
             0x97 | 0x98 => Err(self.refuse(
@@ -595,7 +595,7 @@ impl<'a> Machine<'a> {
                 inert.state = Some(state);
                 return Ok(());
             }
-            // Attributes of an OrderedDict, as those of PyTorch's models have.
+            // Attributes of an OrderedDict, as in PyTorch's models, are ignored.
             Node::Dict(_) => return Ok(()),
             Node::Dtype(_) => return self.build_dtype(target, state),
             Node::Unbuilt(Unbuilt::NumpyArray) => self.build_numpy_array(state)?,

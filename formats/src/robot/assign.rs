@@ -433,7 +433,7 @@ fn checked(
         return Err(refuse("the robot has no bodies".to_owned()));
     };
     if errors[of_stated] <= FITS {
-        // Joints that never move fit in any order.
+        // Joints that never move fit in every order, so they decide nothing.
         let other = candidates.iter().zip(errors).find(|(other, error)| {
             **error <= FITS && is_stated(other) && other.joints != candidates[of_stated].joints
         });
@@ -548,7 +548,7 @@ fn error(
     recorded: &RecordedBodies,
     candidate: &Candidate,
 ) -> Option<f64> {
-    // The rotation of the first body is known.
+    // The rotation of the first body is in the file.
     (candidate.bodies.first() == Some(&Some(0)) && tree.counts().free < 2).then_some(())?;
     let mut largest: f64 = 0.0;
     for sample in &recorded.samples {

@@ -62,7 +62,7 @@ pub enum LimitRule {
     /// They are reported, and kept.
     #[default]
     Report,
-    /// They become the limit, where the joint does not move.
+    /// Values outside become the limit; there the joint does not move.
     Clamp,
     /// They are an error.
     Refuse,
@@ -277,7 +277,7 @@ fn set_differences(all: &mut [(Configuration, ConfigurationRates)], times: &[f64
         {
             *rate = (high - low) / seconds;
         }
-        // Two samples have none between them.
+        // With two samples, there is none between them.
         let centre = if last == 1 {
             sample
         } else {
@@ -387,7 +387,7 @@ fn note_excess(
         return;
     };
     let excess = (low - value).max(value - high);
-    // Limits and keys are rounded to f32 in most files.
+    // Most files store limits and keys as f32, so exceeding by the rounding is allowed.
     if excess <= 1e-6 * value.abs().max(1.0) {
         return;
     }

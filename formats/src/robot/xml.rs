@@ -124,7 +124,7 @@ impl Files {
         let mut rest = limits.file.saturating_sub(first.text.len() as u64);
         let mut this = Self {
             files: vec![first],
-            // The main file's name, too: it cannot include itself.
+            // The main file is in the list of included files, so that it cannot include itself.
             paths: vec![path.file_name().map_or(path, Path::new).to_owned()],
             included: HashMap::new(),
         };

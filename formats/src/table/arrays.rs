@@ -239,7 +239,7 @@ fn append_numbers(numbers: &mut ColumnNumbers, array: &dyn Array) -> Option<()> 
             DataType::UInt16 => extend::<UInt16Type>(list, array)?,
             DataType::UInt32 => extend::<UInt32Type>(list, array)?,
             DataType::UInt64 => {
-                // A number beyond i64 is no time and no count; it stays out of range, and is refused later.
+                // A number beyond i64 is neither a time nor a count. It stays out of range and is refused later.
                 let all = array.as_primitive_opt::<UInt64Type>()?.values();
                 list.extend(
                     all.iter()
@@ -375,7 +375,7 @@ fn append_lists(
             list.values(),
         )
     };
-    // A slice of a longer array begins behind the first number.
+    // A slice of a longer array begins after the first number of the array.
     let (first, last) = (*list_ends.first()?, *list_ends.last()?);
     let items = items.slice(first, last.checked_sub(first)?);
     if items.null_count() > 0 && null.is_none() {

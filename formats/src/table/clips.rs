@@ -368,7 +368,7 @@ impl TableClip<'_> {
             if missing.is_empty() {
                 continue;
             }
-            // The same name as a set gives to a track without a name.
+            // The name that a set gives to a track without a name.
             let name = match &*shared.tracks[track].name {
                 "" => format!("box{}", track + 1),
                 name => printable(name).into_owned(),
@@ -457,7 +457,7 @@ impl TableClip<'_> {
         keys: &mut [RowKeys],
         warnings: &mut Warnings,
     ) -> Result<(), Diagnostic> {
-        // The last list whose times are known to increase, so that it is not checked again.
+        // The last list of times that was checked, so that equal lists are not checked again.
         let mut increases = None;
         for (track, keys) in keys.iter_mut().enumerate() {
             let list = shared.tracks[track].list;

@@ -19,7 +19,7 @@ pub(crate) fn labels(table: &Table, column: usize) -> (Vec<u32>, Vec<String>) {
             let (codes, distinct) = numbered(numbers.iter().copied(), slot);
             (codes, distinct.iter().map(i64::to_string).collect())
         }
-        // The plan asked for names.
+        // The plan allows only columns of names here; any other column counts as a single name.
         _ => (
             vec![0; table.rows],
             vec![table.columns[column].name.clone()],

@@ -199,7 +199,8 @@ pub(crate) fn write_motion<S: RowSink>(
     if clips.iter().all(trackless) {
         components.clear();
     } else if clips.iter().any(trackless) {
-        let message = "a clip of scalars alone beside clips with tracks; write each to a file";
+        let message =
+            "one clip has only scalars, others have tracks; write each to a separate file";
         return Err(invalid(message).into());
     }
     let scalars = scalar_columns(clips);

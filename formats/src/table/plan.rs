@@ -59,7 +59,7 @@ impl TimeSource {
     pub(crate) fn column(self) -> usize {
         match self {
             Self::Times(column) | Self::Frames(column, _) => column,
-            // Any cell leads to the row.
+            // The error is about a row, so any column will do.
             Self::Rows(_) => 0,
         }
     }
@@ -540,7 +540,7 @@ impl MappedColumns {
             return Ok(());
         };
         let message = format!(
-            "nothing reads `{name}={source}` of --map: no track takes it; say of which track it is, such as \
+            "`{name}={source}` of --map has no effect, because no track uses it; name its track, such as \
              `knee.{name}={source}`, or leave it out"
         );
         Err(names.refuse(Code::Map, message))

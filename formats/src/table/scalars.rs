@@ -63,7 +63,7 @@ pub(crate) fn attach_scalars(motion: &mut Motion, index: usize, notes: &[(String
         let is_range = |[low, high]: &[f64; 2]| low <= high;
         scalar.limits = note.limits.filter(is_range);
         let stated = note.interpolation;
-        // Rows have no tangents.
+        // Tables do not store tangents.
         let stated = stated.filter(|&stated| stated != ChannelInterpolation::Cubic);
         scalar.interpolation = stated.or(scalar.interpolation);
     }

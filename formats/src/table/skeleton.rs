@@ -69,7 +69,7 @@ pub(crate) fn attach_skeleton(motion: &mut Motion, index: usize, notes: &[(Strin
     let names = names.map(|track| (motion.set.track_name(track), track));
     let names: HashMap<String, usize> = names.collect();
     let by_name = |name: &String| names.get(name).copied();
-    // Rows of a table may bring its tracks in another order.
+    // The tracks of a table may be in another order than in the skeleton.
     let Some(indices) = tracks.iter().map(by_name).collect::<Option<Vec<usize>>>() else {
         return;
     };

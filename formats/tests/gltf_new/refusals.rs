@@ -72,10 +72,10 @@ fn what_gltf_cannot_hold_is_refused() {
     assert_refused(&[early.sampled()], Code::TimesBelowZero, &["-1.5 s"]);
     let mut late = leg();
     late.times[2] = 1e39;
-    assert_refused(&[late.sampled()], Code::TimesInF32, &["beyond f32"]);
+    assert_refused(&[late.sampled()], Code::TimesInF32, &["too large for f32"]);
 }
 
-/// A day in, f32 has a time every 7.8 ms: enough for 120 frames a second, too little for 240.
+/// After a day, the step of f32 is 7.8 ms: enough for 120 frames a second, too little for 240.
 #[test]
 fn times_that_f32_cannot_tell_apart_are_refused() {
     let at = |rate: f64| {

@@ -217,7 +217,7 @@ fn clocks_that_differ_are_told_and_one_that_was_set_back_is_refused() {
     assert!(
         warning
             .message
-            .contains("`/sim` are of another clock than those of `/wall`")
+            .contains("`/sim` come from another clock than those of `/wall`")
     );
     let mut log = LogBuilder::new();
     let topic = log.topic("/sim", POSE, "cdr");

@@ -116,8 +116,8 @@ __all__ = [
     "write",
 ]
 
-# A Vulkan driver may end the process that loads it, so a process of its own loads them first: this
-# interpreter, with the extension module alone.
+# A Vulkan driver may end the process that loads it. Therefore a separate process loads the drivers first: this
+# interpreter, with only the extension module.
 _LOAD_DRIVERS = """
 import importlib.util, sys
 spec = importlib.util.spec_from_file_location("tumble._tumble", sys.argv[1])

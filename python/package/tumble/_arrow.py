@@ -10,7 +10,7 @@ import numpy as np
 from tumble._errors import InputError
 from tumble._tumble import Clip
 
-# The numbers of a list column are counted by 32 bits.
+# Offsets into a list column have 32 bits.
 _MAX_LIST_VALUES = 2**31 - 1
 
 

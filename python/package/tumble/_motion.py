@@ -37,7 +37,7 @@ _SHAPES: dict[str, tuple[int, ...]] = {"quaternion": (4,), "matrix": (3, 3), "6d
 # Where the arrays of a file start: a multiple of every processor's alignment, and of a cache line.
 _ALIGNED = 64
 _VERSION = 2
-# Members that every file has, besides those that the extension module looks for.
+# Members of every file, in addition to those that the extension module requires.
 _STORED = ("version", "method", "names", "lengths", "rates")
 
 
@@ -671,7 +671,7 @@ class MotionLibrary:
         if each.shape != (len(self),) or not np.isfinite(each).all() or (each < 0).any():
             raise InputError(f"weights: give a number of 0 or more for each of the {len(self)} clips")
         total = each.sum()
-        # Clips of one key have no length: then all are as likely.
+        # If all clips have only one key, their length is 0, and all are equally likely.
         chances = each / total if total > 0 else np.full(len(self), 1 / len(self))
         ids = rng.choice(len(self), size=count, p=chances).astype(np.int64)
         return ids, self.sample_times(ids, rng)
@@ -837,7 +837,7 @@ def _check_out(
         if array.dtype != np.float32 or array.shape != expected:
             raise InputError(f"out: its {name} are {array.dtype} {array.shape}; the result's are float32 {expected}")
         if not array.flags.c_contiguous:
-            raise InputError(f"out: the numbers of its {name} do not lie one behind the other (C order)")
+            raise InputError(f"out: the numbers of its {name} are not contiguous (C order)")
         if not array.flags.writeable:
             raise InputError(f"out: its {name} are read-only")
 

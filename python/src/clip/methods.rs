@@ -206,7 +206,7 @@ impl Clip {
         let (first, last) = self.span();
         let mut hasher = DefaultHasher::new();
         (set.track_count(), set.key_count(), &self.motion.name).hash(&mut hasher);
-        // Both zeros are the same time.
+        // Adding 0 changes -0 to +0, which is the same time.
         [first + 0.0, last + 0.0]
             .map(f64::to_bits)
             .hash(&mut hasher);

@@ -63,7 +63,7 @@ impl Engine {
                     engine.map_err(|error| of_engine(&error))
                 })
             })?,
-            // Drivers may take seconds.
+            // Opening a device may take seconds, so Ctrl-C must be able to interrupt it.
             false => interruptible(py, move || {
                 host::open(&name, &options).map_err(|failure| of_host(&failure))
             })?,

@@ -49,12 +49,12 @@ impl Fan {
         let Some(&any) = corners.first() else {
             return fan;
         };
-        // The half-edge of a corner's face that leads from the vertex to `end`, or from it here.
+        // The half-edge between the vertex and `end`, in the face of the corner.
         let side = |corner: u32, end: u32| match at(faces, next(corner)) == end {
             true => corner,
             false => previous(corner),
         };
-        // Over the edge to `end`: the corner of the next face, and the end of its other edge.
+        // Crosses the edge to `end`: returns the corner of the next face, and the end of its other edge.
         let step = |corner: u32, end: u32| -> Option<(u32, u32)> {
             let twin = surface.links.twin(side(corner, end));
             if twin == NONE || twin == MANY {
@@ -66,7 +66,7 @@ impl Fan {
             let ends = [at(faces, next(found)), at(faces, previous(found))];
             Some((found, if ends[0] == end { ends[1] } else { ends[0] }))
         };
-        // Back to where the fan begins, which is anywhere if it goes all round.
+        // Go back to the beginning of the fan. If the fan goes all around, any corner will do.
         let (mut corner, mut first) = (any, at(faces, next(any)));
         for _ in 0..corners.len() {
             match step(corner, first) {

@@ -128,7 +128,7 @@ impl<'a> Search<'a> {
             }
             match event {
                 Event::Vertex(vertex) => {
-                    // An earlier arrival came in between.
+                    // A shorter path has reached the vertex meanwhile.
                     if least <= self.bound_at(vertex) {
                         self.leave_vertex(vertex);
                     }
@@ -224,7 +224,7 @@ impl<'a> Search<'a> {
             return;
         }
         let parent = self.trail.push(window.parent, half_edge);
-        // Where the ray to the corner opposite enters.
+        // The point where the ray to the opposite corner crosses the edge.
         let entry = window.x + (shape.x - window.x) * window.y / (window.y + shape.y);
         let near = TOLERANCE * shape.length;
         let (mut goes_left, mut goes_right) = (window.low < entry, entry < window.high);
@@ -243,8 +243,8 @@ impl<'a> Search<'a> {
             self.arrive(opposite, length, arrival);
             lengths[2] = self.arrivals.length(opposite);
         }
-        // The third test of Xin and Wang: the corner behind lies right of the rays that leave to the
-        // left, and left of those that leave to the right; the window's end far from it counts.
+        // The third test of Xin and Wang. For rays that leave to the left, the corner behind lies to their right, and
+        // vice versa; the far end of the window counts.
         if goes_left && let Some(child) = window.through_left(&shape, entry, parent) {
             let length = self.shapes[previous(half_edge) as usize].length;
             let limit = child.length + child.distance(child.low) - self.same;

@@ -56,7 +56,7 @@ pub(super) fn trace_path(
     let mut vertex = goal;
     while vertex != start {
         vertex = match arrivals.arrival(vertex) {
-            // Only the start has none before it.
+            // Only the start has no predecessor.
             Arrival::Edge(NONE) => break,
             Arrival::Edge(before) => before,
             Arrival::Window { trail: window, .. } => {
@@ -89,7 +89,7 @@ fn straight(surface: &Surface, source: u32, half_edges: &[u32]) -> Vec<Spot> {
     let mut known = [(ends[0], DVec2::ZERO), (ends[1], DVec2::new(length, 0.0))];
     let mut target = DVec2::ZERO;
     for (index, &half_edge) in half_edges.iter().enumerate() {
-        // The edge's left end comes first; the half-edge may begin at either.
+        // The left end of the edge is the first; the half-edge may begin at either end.
         edges.push(known);
         let is_reversed = known[0].0 != at(faces, half_edge);
         let shape = Shape::of(surface, half_edge);

@@ -111,7 +111,7 @@ impl Window {
     pub(super) fn through_left(&self, shape: &Shape, entry: f64, parent: u32) -> Option<Self> {
         let length = hypotenuse(shape.x, shape.y);
         let along = DVec2::new(shape.x, shape.y) / length;
-        // The ray through a point of the edge meets the left edge so far from its start.
+        // The distance from the start of the left edge at which the ray through a point meets it.
         let meets = |point: f64| {
             let met = point * self.y / (along.x * self.y - along.y * (point - self.x));
             met.clamp(0.0, length)

@@ -93,7 +93,7 @@ fn is_convex(flat: &[DVec2]) -> bool {
     let count = flat.len();
     let at = |corner: usize| flat[corner % count];
     let is_left_everywhere = (0..count).all(|i| orientation(at(i), at(i + 1), at(i + 2)) > 0);
-    // A star turns to the left everywhere too, more than once round.
+    // A star-shaped polygon also turns left everywhere, but goes around more than once.
     is_left_everywhere && (1..count - 1).all(|i| orientation(at(0), at(i), at(i + 1)) > 0)
 }
 
@@ -131,7 +131,7 @@ fn ears(flat: &[DVec2]) -> Option<Vec<[usize; 3]>> {
         let ear = (from..count).chain(0..from).find(is_ear)?;
         triangles.push(around(ear));
         left.remove(ear);
-        // The next ear is looked for at the other side of the cut, so that no fan of slivers arises.
+        // Look for the next ear on the other side of the cut, so that no fan of thin triangles arises.
         from = (ear + 1) % left.len();
     }
     let last = [left[0], left[1], left[2]];

@@ -68,7 +68,7 @@ pub(super) fn near_open_sides(positions: &[DVec3], faces: &[[u32; 3]], distance:
             !faces[face].contains(&vertex) && foot.distance(point) <= distance
         }));
     }
-    // Neighbours along one border are no seam.
+    // Neighbouring vertices of one border are not a seam.
     all.sort_unstable();
     all.dedup();
     all.len()

@@ -73,7 +73,7 @@ pub(super) fn weld<'a>(
                 count: input.len(),
             });
         }
-        // Equal neighbours are one corner.
+        // Equal neighbouring corners are one corner.
         let mut corners: Vec<u32> = polygon
             .iter()
             .map(|&vertex| welding.first_at(vertex))
@@ -218,7 +218,7 @@ fn cut_sides(positions: &[DVec3], faces: &mut Vec<[u32; 3]>, tolerance: f64) -> 
             .iter()
             .map(|&vertex| positions[vertex as usize])
             .collect();
-        // A face so thin that it cannot be cut stays.
+        // If a face is too thin to be divided, it is kept as it is.
         let Ok(made) = cut(&points) else { continue };
         count += corners.len() - 3;
         let mut triangles = made

@@ -14,7 +14,7 @@ pub(super) struct Rewinding {
 /// pieces.
 pub(super) fn wind_alike(vertices: usize, faces: &mut [[u32; 3]]) -> Rewinding {
     let links = Links::new(vertices, faces);
-    // Whether a face runs against the first of its piece; unknown at first.
+    // Whether a face has the opposite orientation of the first face of its piece; unknown at first.
     let mut against: Vec<Option<bool>> = vec![None; faces.len()];
     let mut rewinding = Rewinding {
         count: 0,

@@ -296,7 +296,7 @@ fn integral(function: &impl Fn(f64) -> f64, from: f64, to: f64, depth: u32) -> f
     };
     let middle = f64::midpoint(from, to);
     let (whole, halves) = (over(from, to), over(from, middle) + over(middle, to));
-    // Where the speed has a corner, halving ends after 2^-30 of the line.
+    // Where the speed has a corner, the sum does not converge, so halving ends after 2^-30 of the line.
     if (whole - halves).abs() <= 1e-13 * halves.abs() || depth >= 30 {
         return halves;
     }

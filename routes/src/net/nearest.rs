@@ -127,7 +127,7 @@ fn newton(net: &Net, point: DVec3, start: DVec2) -> OnNet {
         let Some(step) = step(&here, point, uv) else {
             break;
         };
-        // The step is halved until it leads nearer.
+        // Halve the step until it reduces the distance.
         let mut part = 1.0;
         let next = loop {
             let tried = (uv + part * step).clamp(DVec2::ZERO, DVec2::ONE);
@@ -143,7 +143,8 @@ fn newton(net: &Net, point: DVec3, start: DVec2) -> OnNet {
         match next {
             Some(next) => (uv, here) = next,
             None => {
-                // The distance is flat to its last digit: the derivatives still locate the minimum.
+                // The distance does not change in its last digit any more, but the derivatives still locate the
+                // minimum.
                 let last = (uv + step).clamp(DVec2::ZERO, DVec2::ONE);
                 if (last - uv).length() < 1e-7 {
                     uv = last;
@@ -173,7 +174,7 @@ fn step(here: &Derivatives, point: DVec3, uv: DVec2) -> Option<DVec2> {
     let uu = gauss_uu + away.dot(here.uu);
     let vv = gauss_vv + away.dot(here.vv);
     let mixed = gauss_uv + away.dot(here.uv);
-    // Where the square of the distance is not convex, that of the tangent plane is taken.
+    // Where the squared distance is not convex, use that of the tangent plane.
     let one = |full: f64, gauss: f64, slope: f64| {
         let by = if full > 0.0 { full } else { gauss };
         if by > 0.0 { -slope / by } else { 0.0 }
@@ -189,7 +190,7 @@ fn step(here: &Derivatives, point: DVec3, uv: DVec2) -> Option<DVec2> {
             let by = if is_convex { full } else { gauss };
             match by.determinant().abs() > 1e-14 * gauss_uu * gauss_vv {
                 true => -(by.inverse() * slope),
-                // At a collapsed side one derivative is 0, and only the other one counts.
+                // At a collapsed side, one derivative is 0, so only the other one is used.
                 false => DVec2::new(one(uu, gauss_uu, slope.x), one(vv, gauss_vv, slope.y)),
             }
         }

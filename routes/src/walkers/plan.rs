@@ -31,12 +31,12 @@ pub(super) fn plan(walker: &Walker, others: &[(Mover, Stay)]) -> Result<Plan, Wa
     }
     let regions = regions(walker, &stops, others);
     let wait_points = wait_points(&stops, &regions);
-    // The delays with which the walker can come to each wait point.
+    // The delays with which the walker can reach each wait point.
     let mut reached: Vec<Vec<Interval>> = vec![vec![(0.0, 0.0)]];
     for (index, &distance) in wait_points.iter().enumerate() {
         let mut from = raised(&reached[index], &blocked(&regions, distance, distance));
         if index == 0 {
-            // Until it sets out it stands where it is.
+            // Until the walker starts, it stands at its start.
             from.retain_mut(|interval| {
                 interval.0 = interval.0.max(walker.start);
                 interval.0 <= interval.1
@@ -68,9 +68,9 @@ pub(super) fn plan(walker: &Walker, others: &[(Mover, Stay)]) -> Result<Plan, Wa
     let Some(arriving) = arriving.filter(|_| !reached[last + 1].is_empty()) else {
         return Err(WalkerError::Blocked);
     };
-    // Alone on one point there is nothing to walk.
+    // A route of one point needs no plan.
     let arriving = if last == 0 { walker.start } else { arriving };
-    // From the goal back: with each delay one has come from the least in its gap.
+    // Backwards from the goal: each delay was reached from the smallest delay of its gap.
     let mut delays = vec![(arriving, arriving); wait_points.len()];
     let mut current = arriving;
     for index in (0..=last).rev() {

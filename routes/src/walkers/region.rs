@@ -104,7 +104,7 @@ impl Region {
             }
         };
         let (a, b, c) = (self.along, self.by_delay, self.offset);
-        // Where the boundary turns: the gradient by the one coordinate is 0.
+        // At these points the boundary has an extreme: one partial derivative is 0.
         for (main, other, swap) in [(a, b, false), (b, a, true)] {
             if main.length_squared() > 0.0 {
                 // main coordinate = p + q * other coordinate
@@ -116,7 +116,7 @@ impl Region {
                 }
             }
         }
-        // On the bounds of the route, and on those of time: w = time - slowness * s.
+        // The boundary also has corners at the bounds of the route and of time, where w = time - slowness * s.
         let times = [self.from, self.to]
             .into_iter()
             .filter(|time| time.is_finite());
@@ -133,7 +133,7 @@ impl Region {
                 include(DVec2::new(s, time - self.slowness * s));
             }
         }
-        // A body that stays for ever blocks all delays from one on.
+        // A body that stays forever blocks all delays from some delay on.
         let (low, mut high) = found?;
         if self.to == f64::INFINITY {
             high.y = f64::INFINITY;

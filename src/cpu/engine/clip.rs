@@ -44,7 +44,7 @@ impl CpuEngine {
             return Ok(());
         }
         let stop = stop::current();
-        // Waking a thread costs more than a task's worth of work.
+        // Waking a thread takes longer than evaluating this many rotations.
         if output.len() <= TASK {
             return Ok(self.window(clip, timeline, window, Some(output.len()), output)?);
         }
@@ -126,7 +126,7 @@ impl CpuEngine {
                 others: Vec::new(),
             };
             if sparse.output.len() <= SAMPLES_ONE_BY_ONE {
-                // To clear a block would take longer than the samples.
+                // Clearing a block would take longer than these samples.
                 sparse.fill::<Vec4>(None);
             } else {
                 in_lanes_of(self.width, &mut sparse);

@@ -74,7 +74,7 @@ impl CpuEngine {
     ) -> Result<(), SetError> {
         stop::check()?;
         let samples = request.samples.len();
-        // Tracks that share key times and sample times share their groups too.
+        // Tracks with the same key times and sample times also have the same groups.
         let mut sorted: Vec<(usize, Sorted)> = Vec::new();
         let shares = !matches!(request.timeline.ticks, Ticks::Times { stride: 1.., .. });
         let mut of_track = Vec::with_capacity(tracks.len());

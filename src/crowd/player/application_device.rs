@@ -38,7 +38,7 @@ impl Crowd {
         buffer: VulkanBuffer,
     ) -> Result<CrowdTarget, CrowdError> {
         let output = output.into();
-        // No application has a buffer on a device that the engine opened.
+        // On a device that the engine opened, an application has no buffers.
         let device = vulkan_crowd(self.device.as_deref());
         let device = device.filter(|device| !device.engine.device.owned);
         let device = device.ok_or(CrowdError::OtherDevice)?;

@@ -283,7 +283,7 @@ impl Crowd {
             Some(device) if len > 0 => {
                 let layers = self.arguments.layers as usize;
                 if let Err(error) = device.submit(output, &self.instances.take_frame(layers)) {
-                    // The recorded commands may never have reached the device.
+                    // The recorded commands may never have been executed, so the entries on the device are unknown.
                     self.instances.forget();
                     return Err(error.into());
                 }

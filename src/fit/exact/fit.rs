@@ -190,8 +190,8 @@ impl IntervalCurve {
         if dot(rotation, rotation) > 0.5 || !self.shape.is_unit {
             return rotation;
         }
-        // A normalised polynomial may pass through 0, where it is not a rotation: the rotation just
-        // after that is taken.
+        // A normalised polynomial may pass through 0, where it is not a rotation. Then use the rotation just after this
+        // point.
         (self.shape.rotation)(&self.numbers, t + 1e-9)
     }
 

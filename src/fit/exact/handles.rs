@@ -300,8 +300,8 @@ pub(crate) struct ControlRotations<'a>(pub(crate) &'a mut Intervals);
 impl InLanes for ControlRotations<'_> {
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
-        // Taken out, so that input and output are separate arguments: the compiler then knows that
-        // they do not overlap, and makes vectors of the loop.
+        // Moved out of `self`, so that the compiler knows that input and output do not overlap, and vectorises the
+        // loop.
         let mut numbers = std::mem::take(&mut self.0.numbers);
         let mut squared_extents = self.0.squared_extents;
         let controls = numbers.first_chunk_mut().expect("four rotations");

@@ -57,8 +57,8 @@ impl<F: Formula> Sampling for Directly<F> {
             }
             let at = L::Doubles::load(&block.middles[lane..]);
             let width = L::Doubles::load(&block.widths[lane..]);
-            // One loop over all nodes: the formula is compiled once, and terms that do not change along
-            // a curve are computed once.
+            // A single loop over all nodes, so that the formula is compiled once and terms that are constant along a
+            // curve are computed once.
             let mut found = [[zero; 4]; POWERS];
             let mut doubt = zero;
             for (found, &offset) in found.iter_mut().zip(offsets) {

@@ -152,7 +152,7 @@ impl FindCurves<'_> {
             let to_start = L::all(THIRD) - to_end;
             store(&mut lanes.incoming, key, scaled(tangent, to_start));
             store(&mut lanes.outgoing, key, scaled(tangent, to_end));
-            // `KEY_UNKNOWN` becomes 4/3, which is above the limit of 1.
+            // 2/3 of `KEY_UNKNOWN` is 4/3, which exceeds the limit of 1.
             let kind = kind * L::all(2.0 / 3.0);
             let parts = square(left).larger(square(right).larger(square(sum(left, right))));
             let limit_ratio = parts * L::all(1.0 / LONGEST_TANGENT_PART);
@@ -184,7 +184,7 @@ impl FindCurves<'_> {
             let log = load3::<L>(&whole.logs, this);
             let outgoing = load3::<L>(&whole.outgoing, this);
             let incoming = load3::<L>(&whole.incoming, next);
-            // At a track's ends the handle is 0 so far; there it becomes the parabola's.
+            // At the ends of a track the handle is 0 so far. For parabolic ends it is replaced here.
             let parabola = scaled(log, L::all(TWO_THIRDS));
             let [_, _, _, first] = weights.load::<L>(this);
             let [_, _, _, last] = weights.load::<L>(next);

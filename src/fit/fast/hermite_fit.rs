@@ -127,7 +127,7 @@ impl<L: Lanes> CurvePoint<L> {
         let third_rotation = short_exp(scaled(w3, L::all(b3)));
         let last_rotations = composed(short_exp(scaled(w2, L::all(b2))), third_rotation);
         let rotation = if EXACT {
-            // Curves that are halved turn farther; f32 would round too much in this product.
+            // Curves that are divided rotate farther, and in this product f32 would round too much.
             let factors = product(medium_exp(w1, b1), medium_exp(w2, b2));
             let factors = product(factors, medium_exp(w3, b3));
             rounded(product(normalised(widened(start)), factors))

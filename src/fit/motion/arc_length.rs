@@ -61,7 +61,7 @@ impl ArcLengths {
         let mut u = self.parameter_at(curve, (from + (to - from) * t) * self.total());
         let (mut velocity, mut acceleration) = rates(curve, u);
         if length(velocity) < SLOW * self.total() {
-            // A curve at rest has no direction; it has one a little way into the interval.
+            // A curve at rest has no direction, so it is taken slightly inside the interval.
             u = u.clamp(NEXT_TO_REST, 1.0 - NEXT_TO_REST);
             (velocity, acceleration) = rates(curve, u);
         }

@@ -65,7 +65,7 @@ impl VulkanEngine {
             room.copy_from_slice(bytemuck::cast_slice(intervals));
             uploads.push(upload);
         }
-        // Made last: dropped first, it waits for its work before the buffers are freed.
+        // Created last, so that it is dropped first: it waits for its work before the buffers are freed.
         let mut submission = Submission::new(&self.device, QueueLane::Kernels)?;
         submission.begin()?;
         let work = &mut submission.work;
@@ -80,7 +80,7 @@ impl VulkanEngine {
             let push = ArcsDispatch { count };
             work.recording.dispatch(set, &push, workgroups(count));
         }
-        // All work that is submitted later sees the arcs, also an application's work.
+        // Make the arcs visible to all work that is submitted later, also to an application's.
         work.recording.publish();
         work.bind(|kernel| self.pipeline(kernel))?;
         submission.run()?;

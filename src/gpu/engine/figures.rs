@@ -158,7 +158,7 @@ impl VulkanEngine {
     fn store_rate(&self, buffer: &Buffer, bytes: u64) -> Result<f64, VulkanError> {
         let samples = (bytes / size_of::<[f32; 4]>() as u64) as u32;
         let upload = |bytes: &[u8]| self.resident("tumble write rate", bytes, &mut Vec::new());
-        // No segment is read but the first.
+        // Only the first segment is read.
         let constants = upload(bytemuck::cast_slice(&[[0.0_f32, 0.0, 0.0, 1.0]; 2]))?;
         if !self.maps_samples {
             let items: Vec<Item> = (0..samples / ITEM_SAMPLES)
@@ -186,7 +186,7 @@ impl VulkanEngine {
                 )
             });
         }
-        // Eight lanes store a line.
+        // With eight lanes, each store fills a cache line.
         let lanes = SpreadLanes::new(3);
         let each = 128;
         let runs: Vec<SpreadRun> = (0..samples / each)

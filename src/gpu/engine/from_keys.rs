@@ -43,7 +43,7 @@ impl VulkanEngine {
         })?;
         let mut dispatches = job.dispatches(self.window())?;
         let each = size_of::<Quat>();
-        // A dispatch's result may begin at any rotation, and a binding must be able to as well.
+        // The result of a dispatch may begin at any rotation, so bindings must be allowed at any rotation.
         let info = &self.device.physical.info;
         let imports = self.imports && info.min_storage_buffer_offset_alignment <= each as u64;
         // The set's keys, where kernels read them in place.
@@ -85,7 +85,7 @@ impl VulkanEngine {
         let device = &self.device;
         let size = output.len() as u64;
         let destination = target.destination();
-        // One queue alone gains nothing by a copy: kernels then write where the host reads.
+        // With only one queue, a separate copy would not be faster, so kernels write directly into the host's memory.
         let staged = !device.placing.in_place && device.copies_apart;
         let rotations = match destination {
             Some((buffer, first)) => Binding::range(buffer, first + output.start as u64, size),

@@ -106,7 +106,7 @@ impl VulkanEngine {
             let each = (size_of::<Item>() + 2 * Encoding::F32.bytes()) as u64;
             window = window.min(half / in_flight_count as u64 / each);
         }
-        // Windows start at aligned offsets where their length allows.
+        // Window lengths are multiples of 64 if possible, so that windows start at aligned offsets.
         let window = (window / 64 * 64).max(64) as usize;
         let bytes = |bytes| usize::try_from(bytes).unwrap_or(usize::MAX);
         Self {
@@ -202,8 +202,8 @@ impl VulkanEngine {
         if let Some(pipeline) = kept() {
             return Ok(pipeline);
         }
-        // Made outside the lock, because drivers take up to seconds for it. If several callers
-        // make this one, the first is kept.
+        // Created outside the lock, because drivers take up to seconds. If several callers create this pipeline, the
+        // first one is kept.
         let made = Arc::new(Pipeline::new(&self.device, kernel, Exactness::Demanded)?);
         self.trust(kernel, &made)?;
         let mut all = lock(&self.pipelines);
@@ -311,7 +311,7 @@ impl VulkanEngine {
         clip: &ClipData,
         spare: Option<ClipBuffers>,
     ) -> Result<ClipBuffers, VulkanError> {
-        // Under a memory budget the old buffers are freed before new ones are allocated.
+        // With a memory limit, the old buffers are freed before new ones are allocated.
         let spare = spare.filter(|old| self.clip_bytes.is_none() && self.owns(old));
         let spare = spare.into_iter().flat_map(|buffers| buffers.groups);
         let (mut segments_of, mut constants_of): (Vec<Buffer>, Vec<Buffer>) = spare.unzip();
@@ -429,7 +429,7 @@ impl VulkanEngine {
         let bytes = (whole.len() * encoding.bytes()) as u64;
         let fits = bytes <= self.device.physical.info.max_memory_allocation_size;
         let in_place = self.device.placing.in_place;
-        // Memory that a card copies into takes long to allocate: only for requests that are repeated.
+        // Allocating memory into which a card can copy takes long, so this is done only for requests that are repeated.
         let kept = self.kept(job, &whole)?;
         let pays = in_place || kept.is_some();
         let residence = match in_place {
@@ -438,7 +438,7 @@ impl VulkanEngine {
         };
         let buffer = match fits && pays {
             true => match self.output_buffer(bytes, residence) {
-                // Window by window the result may still be made.
+                // The result may still fit if it is computed window by window.
                 Err(error) if error.is_out_of_memory() => None,
                 // The host changes some rotations (`patches`). In memory that is not coherent it would have to flush
                 // whole atoms, and could overwrite rotations of the next window, which the device may be writing.

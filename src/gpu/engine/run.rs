@@ -89,7 +89,7 @@ impl VulkanEngine {
         kept: Option<&KeptLists>,
     ) -> Result<(), EvaluateError> {
         let max_values = || self.window_of(job.encoding);
-        // Each is cut again before it starts: windows may have been halved since.
+        // Each window is divided again before it starts, because windows may have been halved meanwhile.
         let windows = window.cut(max_values()).flat_map(|window| {
             let first = window.start;
             window.cut(max_values()).map(move |part| Window {
@@ -241,7 +241,7 @@ impl VulkanEngine {
             in_flight.push(InFlight::new(&self.device)?);
         }
         let (flight, mut stopwatch) = (&mut in_flight[0], Stopwatch::default());
-        // Work on a result that is exported may still go on.
+        // If a result is exported, work on it may continue after the call.
         let mut finish = |flight: &mut InFlight<WorkLists>| {
             flight.finish(&mut Target::External(*target), &mut stopwatch)
         };

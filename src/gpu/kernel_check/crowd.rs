@@ -217,7 +217,7 @@ pub(super) fn rows(random: &mut Random) -> Rows {
 }
 
 fn walk(random: &mut Random) -> Trial {
-    // The levels of a skeleton; the one that is walked is the last.
+    // The links of all levels. The kernel computes the last level.
     const LINKS: [[u32; 2]; 6] = [[1, 0], [2, 0], [6, 1], [3, 2], [5, 2], [4, 1]];
     const LEVEL: usize = 4;
     const POSES: usize = 19;
@@ -282,7 +282,7 @@ fn skin(random: &mut Random) -> Trial {
 
 fn half(random: &mut Random) -> Trial {
     const VALUES: usize = 139;
-    // A number near the largest half float, or any number.
+    // A number near the largest half float, or any other number.
     let number = |random: &mut Random| match random.once_in(4) {
         true => 65_520.0 + 100.0 * random.number(),
         false => random.finite(),
@@ -333,7 +333,7 @@ fn scattered(random: &mut Random) -> Trial {
         .filter(|_| random.once_in(3))
         .map(|(entry, index)| change(index, &entry))
         .collect();
-    // The last one is not counted.
+    // The last change is not counted.
     let count = changes.len() - 1;
     let dispatch = CrowdDispatch {
         count: count as u32,

@@ -33,7 +33,7 @@ struct KeyRows {
 
 pub(super) fn trials(kernel: Kernel, random: &mut Random) -> Vec<Trial> {
     let rows = KeyRows::new(random, kernel == Kernel::FromKeysCubics);
-    // All rows of an invocation, or one each that begins where a line of memory does.
+    // An invocation with all its rows, and one row per invocation that begins within a cache line.
     [(ROWS_PER_INVOCATION, 0), (1, 7)]
         .map(|(each, line)| rows.trial(kernel, each, line))
         .into()
@@ -105,7 +105,7 @@ impl KeyRows {
         });
         let samples = samples.collect();
         let mut weights: Vec<_> = (0..KEYS).map(|_| random.weights()).collect();
-        // Nothing lies before the first key, and nothing after the last.
+        // There is nothing before the first key and nothing after the last one.
         (weights[0].kind, weights[KEYS - 1].kind) = (KEY_AT_END, KEY_AT_END);
         Self {
             keys,

@@ -23,7 +23,7 @@ use crate::twin::machine::{Memory, UNTOUCHED};
 /// The number of values after a result that no kernel may write.
 const GUARD: usize = 16;
 
-/// One dispatch of a kernel. Its output is [`UNTOUCHED`] before, or what the trial says.
+/// One dispatch of a kernel. Before it, the output contains [`UNTOUCHED`], or values that the trial states.
 pub(crate) struct Trial {
     /// The buffers that it reads, in the order of their bindings.
     pub(crate) inputs: Vec<Vec<u8>>,

@@ -158,7 +158,7 @@ impl Passes {
         if known.len() == before {
             return;
         }
-        // Other processes may have written meanwhile.
+        // Other processes may have written to the file meanwhile.
         let mut all = read(&self.cache);
         all.extend(known.iter().cloned());
         if all.len() > MAX_LINES {
@@ -195,7 +195,7 @@ mod tests {
         assert!(!passes.has(&one));
         passes.remember([one.clone()]);
         assert!(passes.has(&one) && !passes.has(&two));
-        // Two processes that began at the same time.
+        // Two processes that start at the same time.
         let other = Passes::of(cache.clone());
         passes.remember([two.clone()]);
         let three = KernelPass::of(DEVICE, 3);
@@ -230,7 +230,7 @@ mod tests {
         let file = format!("{}\n{line}\n{}", foreign.join("\n"), &line[..20]);
         assert!(cache.write(FILE, &[file.as_bytes(), &[0xff, 0xfe]].concat()));
         assert_eq!(read(&cache), BTreeSet::from([sound]));
-        // More lines than there are devices anywhere: the entries of this process stay.
+        // As many lines as the file may have: the entries of this process must stay.
         let many: String = (0..MAX_LINES as u64)
             .map(|code| KernelPass::of(DEVICE, code).0 + "\n")
             .collect();

@@ -32,7 +32,7 @@ pub(super) fn trials(kernel: Kernel, random: &mut Random) -> Vec<Trial> {
         Kernel::PosesBlend => vec![
             blend(random, &[0.5, 0.25, 0.25]),
             blend(random, &[1.0, -1.0]),
-            // A sum that is hardly long enough.
+            // A sum whose length is just above the limit.
             blend(random, &[1.0003 * LEAST_SQUARED_SUM.sqrt(), 0.0]),
         ],
         Kernel::PosesMix => [0.0, 0.4, 1.0].map(|weight| mix(random, weight)).into(),

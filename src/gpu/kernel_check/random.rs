@@ -194,7 +194,7 @@ impl Random {
                 let angle = self.scaled(-60..0).abs();
                 self.near(identity, angle)
             }
-            // Half of a gimbal lock: two of the components of one angle are small.
+            // Close to a gimbal lock: two components of one angle are small.
             3 => {
                 let [x, _, z, w] = self.unit();
                 let off = self.scaled(-30..-20);
@@ -255,7 +255,7 @@ impl Random {
     /// The tangent weights at a key.
     pub(crate) fn weights(&mut self) -> TangentWeights {
         let kinds = [KEY_INNER, KEY_INNER, KEY_INNER, KEY_AT_END, KEY_UNKNOWN];
-        // For keys at even times, both steps have the same weight.
+        // If keys are at even times, both steps have the same weight.
         let even = self.once_in(4).then_some(0.5);
         let limit = if self.once_in(2) { 0.33 } else { 0.05 };
         TangentWeights {

@@ -72,7 +72,7 @@ pub(super) fn trials(kernel: Kernel, random: &mut Random) -> Vec<Trial> {
 
 fn of_form<S: Segment>(list: List, store: Store, random: &mut Random) -> Vec<Trial> {
     let encodings = Encoding::of_store(store);
-    // Two shapes of a dispatch, and every encoding at least once.
+    // Use two shapes of dispatches, and every encoding at least once.
     (0..encodings.len().max(2))
         .map(|i| {
             let scene = SegmentInputs::<S>::new(random, encodings[i % encodings.len()]);
@@ -145,7 +145,7 @@ struct SegmentInputs<S> {
 
 impl<S: Segment> SegmentInputs<S> {
     fn new(random: &mut Random, encoding: Encoding) -> Self {
-        // Other stores take rotations alone.
+        // All other stores only accept rotations.
         let takes_any = encoding.row().takes_vectors;
         let segment = |random: &mut Random| match takes_any && random.once_in(3) {
             true => S::any(random),
@@ -163,7 +163,7 @@ impl<S: Segment> SegmentInputs<S> {
     /// Makes an item, whose first sample has an offset.
     fn item(&mut self, random: &mut Random, is_listed: bool, output: u32, count: u32) {
         let (source, bit) = Self::source(random);
-        // Frames about the middle of a short run, or those at one end of a very long one.
+        // Frames near the middle of a short run, or frames at one end of a very long one.
         let (frame, scale) = match random.once_in(6) {
             true => (random.word() as i32 >> 9, 0.25 / (1 << 23) as f32),
             false => (
@@ -227,7 +227,7 @@ impl<S: Segment> SegmentInputs<S> {
             self.item(random, is_listed, output as u32, count as u32);
             next[track] += count;
         }
-        // Another dispatch has the first items.
+        // The first items belong to another dispatch, so this one must not evaluate them.
         let dispatch = Dispatch {
             first_item: BEFORE as u32,
             item_count: ITEMS as u32,
@@ -351,7 +351,7 @@ impl<S: Segment> SegmentInputs<S> {
         repetitions.outputs = output + 1;
         let mut list = vec![NO_RUN; lanes.entries(&chunk)];
         lanes.write_chunk(&chunk, 0, &mut list);
-        // Another dispatch has the first entry.
+        // The first entry belongs to another dispatch, so this one must not evaluate it.
         let entries = list.len() as u32;
         list.insert(0, SpreadRun { count: 9, ..NO_RUN });
         let dispatch = lanes.dispatch_repeated([1, entries], repetitions, self.detail(), FIRST);
@@ -411,7 +411,7 @@ impl<S: Segment> SegmentInputs<S> {
             self.row(random, is_listed, [0, SAMPLES]);
             of_rows.push(self.blocks(first_item, [0, SAMPLES]));
         }
-        // [block of samples][row]
+        // The blocks are indexed [block of samples][row].
         let of_samples = SAMPLES.div_ceil(BLOCK_SAMPLES) as usize;
         let blocks = (0..of_samples).flat_map(|i| of_rows.iter().map(move |row| row[i]));
         let blocks: Vec<_> = [OTHER].into_iter().chain(blocks).collect();
@@ -423,7 +423,7 @@ impl<S: Segment> SegmentInputs<S> {
             first_output: FIRST,
             first_block: 1,
         };
-        // A row may begin anywhere in a line.
+        // A row may begin anywhere within a line, so one more line may be needed.
         let tiles = (LINE - 1 + ROWS).div_ceil(LINE);
         let layers = SAMPLES.div_ceil(WORKGROUP / LINE * SAMPLES_EACH);
         self.grid(&blocks, grid, [2, tiles.div_ceil(2), layers], is_listed)

@@ -16,7 +16,7 @@ pub(crate) fn trial() -> Trial {
 fn probes() -> Vec<Probe> {
     let mut state = 1u32;
     let mut next = || {
-        // Numerical Recipes' linear congruential generator: any spread will do.
+        // Numerical Recipes' linear congruential generator. Its quality is sufficient here.
         state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
         (state >> 8) as f32 / (1 << 23) as f32 - 1.0 // exact, in [-1, 1)
     };

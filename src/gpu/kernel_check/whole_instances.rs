@@ -28,7 +28,7 @@ const CLOCK: u64 = 0x00ab_cdef_0123_4567;
 pub(super) fn trials(kernel: Kernel, random: &mut Random) -> Vec<Trial> {
     use CrowdValues::{Local, Model, Rotations, Skinning};
     if kernel == Kernel::CrowdSubgroupRotations {
-        // Two instances of two time bases, and one of them, with the fewest lanes.
+        // Two instances with two time bases, and one of them, for subgroups with the fewest lanes.
         return [2, 1]
             .map(|instances| of_subgroups(random, instances))
             .into();
@@ -65,7 +65,7 @@ fn of_subgroups(random: &mut Random, instances: u32) -> Trial {
         ..CrowdDispatch::zeroed()
     };
     let pushed = SubgroupInstances::pushed(instances.ilog2(), &arguments);
-    // As many workgroups as it takes where each has one subgroup; others find nothing to do.
+    // As many workgroups as are needed if each has only one subgroup. With more subgroups, some find nothing to do.
     let groups = [2, INSTANCES.div_ceil(instances).div_ceil(2), 1];
     Trial::new(scene.inputs(), &pushed, groups)
 }
@@ -214,7 +214,7 @@ impl WholeScene {
             is_skinning: (output.values == CrowdValues::Skinning).into(),
             is_half: output.is_half.into(),
         };
-        // One of the workgroups has no instance.
+        // One workgroup too many, which must do nothing.
         let groups = [2, INSTANCES.div_ceil(OF_WORKGROUP).div_ceil(2), 1];
         let mut inputs = self.inputs();
         if !is_rotations {

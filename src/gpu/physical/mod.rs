@@ -62,8 +62,8 @@ pub(crate) struct PhysicalDevice {
     pub(crate) pipeline_cache: (u32, u32, [u8; 16]),
     /// Whether shaders may use integers of 64 bits.
     pub(crate) has_int64: bool,
-    /// Whether kernels convert to half precision: conversions round to nearest, ties to even, and keep subnormal
-    /// numbers, whatever numbers of 32 bits do, and buffers may have halves.
+    /// Whether kernels may use the device's conversion to half precision: it rounds to nearest, ties to even, keeps
+    /// subnormal numbers (also if f32 operations flush them), and buffers may contain halves.
     pub(crate) converts_halves: bool,
     /// The lanes of a subgroup, if they are as many as kernels need and can vote and shuffle in them.
     pub(crate) subgroup_lanes: Option<u32>,
@@ -259,7 +259,7 @@ impl PhysicalDevice {
         let longest = u64::from(self.max_texel_buffer_elements) * TEXEL_BYTES;
         let can = self.has_int64 && longest >= self.info.max_memory_allocation_size;
         match reads {
-            // Where few storage buffers can be bound, texel buffers count apart.
+            // Some devices can bind few storage buffers, but texel buffers in addition to them.
             Reads::Automatic => {
                 can && (self.info.kind == DeviceKind::Cpu
                     || self.storage_buffers < MAX_STORAGE_BUFFERS)

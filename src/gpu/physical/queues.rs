@@ -175,7 +175,7 @@ mod tests {
         let mut families = card("lavapipe").families;
         families[0].queue_count = 2;
         assert_eq!(copy_queue(&families, 0), queue(0, 1));
-        // A family for video can copy, and stays what it is for.
+        // A family for video could copy, but it is not used for this.
         let mut video = card("H200").families;
         video.retain(|family| family.queue_flags.intersects(OTHER_WORK));
         assert!(!video.is_empty());

@@ -54,7 +54,7 @@ fn a_set_knows_which_keys_the_one_before_turns() {
         let times = [0.0, 1.0];
         let shared = TrackSet::with_shared_times(&times, &tracks(second)).unwrap();
         let mut pushed = TrackSet::new();
-        // A track that is refused leaves no signs behind.
+        // A refused track must not leave signs in the set.
         let refused = [
             Quat::IDENTITY,
             -Quat::IDENTITY,

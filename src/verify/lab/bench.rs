@@ -477,8 +477,8 @@ impl Bench<'_> {
         let mut left = rules::halve(variants.len(), FINALISTS, &mut |index, rows| {
             self.row(dispatch(index), between, rows)
         })?;
-        // The rule about stores needs the variant that differs from the engine's only in its stores, so it is never
-        // left out.
+        // The rule about stores compares with the variant that differs only in its stores, so this variant is never
+        // removed.
         let cached = variants[0].cached();
         let cached = variants.iter().position(|variant| *variant == cached);
         left.extend(cached.filter(|index| !left.contains(index)));

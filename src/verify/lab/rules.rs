@@ -79,7 +79,8 @@ pub(super) fn streams(cached: f64, streamed: f64) -> bool {
     cached >= GAIN_OF_STREAMING * streamed
 }
 
-/// Whether applications should name the users of results, by what a barrier for all and one for kernels take.
+/// Whether applications should name the users of results: compares the time of a barrier for all commands with that of
+/// a barrier for kernels.
 pub(super) fn needs_scopes(for_all: f64, for_kernels: f64) -> bool {
     for_all - for_kernels >= SAVED_BY_SCOPES
 }

@@ -120,14 +120,14 @@ impl GroupGrid {
             starts: 0,
         });
         let end = self.arguments.samples.div_ceil(BLOCK_SAMPLES);
-        // The row, the first of its blocks that is not written, and the last item that began in it.
+        // The current row, the first of its blocks that is not yet written, and the last item that began in the row.
         let (mut row, mut next, mut last) = (0, 0, nothing);
         for (index, item) in (first_item..).zip(items(list)) {
             let (item_row, position) = self.all.cell(item.output);
             let item_row = item_row - self.first_row;
             if item_row != row || index == first_item {
                 self.go_on(row, next..end, last, blocks);
-                // Positions before the row's first item belong to it and lie before it.
+                // Positions before the first item of the row get this item.
                 (row, next, last) = (item_row, 0, index);
             }
             let block = position / BLOCK_SAMPLES;
@@ -158,7 +158,7 @@ impl GroupGrid {
 
     /// The workgroups of its dispatch.
     pub(crate) fn workgroups(&self) -> [u32; 3] {
-        // Rows of neighbours begin up to a line less one before the first track.
+        // Rows may begin up to LINE - 1 positions before the first track, so that neighbouring rows begin at a line.
         let tiles = (self.arguments.rows + LINE - 1).div_ceil(LINE);
         let samples = WORKGROUP * SAMPLES_EACH / LINE;
         [tiles, 1, self.arguments.samples.div_ceil(samples)]
@@ -177,7 +177,7 @@ mod tests {
     fn listed(rows: GridRows, tracks: u32) -> GroupWork {
         let mut chunks = [WorkChunk::default(), WorkChunk::default()];
         let mut random = fastrand::Rng::with_seed(u64::from(rows.stride + tracks));
-        // The first tracks and one in between have nothing.
+        // The first two tracks, and one in between, have no items.
         for track in (2..tracks).filter(|track| *track != 5) {
             let mut sample = random.u32(..40);
             while sample < rows.samples {

@@ -249,8 +249,7 @@ impl KeyDispatch<'_, '_> {
         let mut next_key = 0;
         let mut outputs = Vec::with_capacity(self.tasks.len());
         for task in &self.tasks {
-            // Several rows share the samples and weights of the first, which the first task
-            // writes.
+            // Several rows share the samples and weights of the first row, which the first task writes.
             let (sample_count, weight_count) = match self.rows {
                 1 => (task.sample_count(), task.keys),
                 _ => (samples.len(), weights.len()),

@@ -78,7 +78,8 @@ impl Work {
                 }
             }
             let first_output = group.first_output + stored.first;
-            // Only samples lie one after another.
+            // Only sample lists store neighbouring values by neighbouring invocations, so only their results can begin
+            // within a line.
             let idle = match stored.begins_lines && self.list == List::Samples {
                 true => first_output % LINE,
                 false => 0,
@@ -102,7 +103,7 @@ impl Work {
         } = stored;
         let bytes = encoding.bytes();
         let mut encoded = [0; PATCHED_BYTES];
-        // Neighbouring patches are copied together.
+        // Patches of neighbouring rotations are copied together.
         let are_neighbours = |one: &Patch, next: &Patch| next.0 == one.0 + 1;
         let per_command = PATCHED_BYTES / bytes;
         let rows = self.patches.chunk_by(are_neighbours);
@@ -272,7 +273,7 @@ impl Lister {
         nothing.fill(Item::zeroed());
         write(&lists, rows, items, bytemuck::cast_slice_mut(distances));
         if rows.is_some() {
-            // They are written out of order, and read meanwhile.
+            // Blocks are written in any order and read meanwhile, so this is not done in the device's memory.
             self.listed_blocks.resize(block_count, Block::zeroed());
             write_blocks(&lists, &grids, item_count as u32, &mut self.listed_blocks);
             copy(blocks, bytemuck::cast_slice(&self.listed_blocks));

@@ -68,8 +68,7 @@ impl<'a> SampleList<'a> {
         for (group, prepared) in clip.groups.iter().enumerate() {
             let parts = parts_in(prepared, window);
             let [part, ..] = parts else { continue };
-            // An estimate: spans need not lie in the order of the parts, which have about equally
-            // many.
+            // An estimate: spans are not always in the order of the parts, but parts have about equally many.
             spans += prepared.spans.starts.len() * parts.len() / prepared.parts.len();
             part_count += parts.len();
             let first = all.start(prepared, part, before);

@@ -140,7 +140,7 @@ impl SharedGroup {
         if !first.patches.is_empty() {
             return Ok(None);
         }
-        // A component of any track may be tiny.
+        // A run stands for several tracks, so a component of any of them may be tiny.
         first.runs.par_iter_mut().for_each(|run| {
             let segment = |track: u32| run.source.wrapping_add(stride.segments.wrapping_mul(track));
             if run.count & (IS_CONSTANT | NEEDS_CARE) == 0
@@ -233,7 +233,7 @@ impl SharedRuns {
         window: &Window,
     ) -> Result<Option<Self>, SampleTimesError> {
         let timeline = request.timeline;
-        // Tracks may have times of their own.
+        // If each track has separate times, no list can be shared.
         if matches!(timeline.ticks, Ticks::Times { stride, .. } if stride > 0) {
             return Ok(None);
         }
@@ -258,7 +258,7 @@ impl SharedRuns {
         let lanes = SpreadLanes::of_runs(counts, request.run_lanes);
         let (mut lists, mut distances) = (Vec::new(), Vec::new());
         for mut group in groups {
-            // Of explicit times, a run has the index of its first distance.
+            // With explicit times, a run contains the index of its first distance.
             if !group.first.distances.is_empty() {
                 let before = distances.len() as i32;
                 for run in &mut group.first.runs {
@@ -338,7 +338,7 @@ mod tests {
 
     fn set(times: &[f64], tracks: usize) -> TrackSet {
         let key = |i: usize| {
-            // Small steps, so that no curve is cut.
+            // Small rotations, so that no curve is divided.
             let angle = (i * 7919 % 1000) as f32 / 4000.0;
             Quat::from_rotation_x(angle) * Quat::from_rotation_z(0.3 + angle * 0.7)
         };
@@ -454,7 +454,8 @@ mod tests {
                         panic!("{method}: sample {index}: {found:?}, {expected:?}");
                     };
                     assert!(care || !needs_care);
-                    // Of listed times, the distances are equal, not their indices; keys have none.
+                    // With listed times, the indices may differ, but the distances must be equal. Keys have no
+                    // distance.
                     if !distances.is_empty() && !found.0 && !expected.0 {
                         let of =
                             |list: &Vec<f32>, index: i32| list[index as usize].to_bits() as i32;

@@ -216,7 +216,7 @@ impl SpreadLanes {
     }
 
     /// The push constants of a dispatch, whose values are stored from an index on.
-    // The lab and tests have runs without repetitions.
+    // Lists without repetitions are used only by the lab and by tests.
     #[cfg_attr(not(feature = "prove"), allow(dead_code))]
     pub(crate) fn dispatch(self, entries: [u32; 2], detail: u32, output: u32) -> Spread {
         self.dispatch_repeated(entries, RunRepetitions::ONE, detail, output)

@@ -103,7 +103,7 @@ pub(crate) fn merge(folder: &Path) -> Result<MergeSummary, Failure> {
             format!("{shown}: has no shards to merge; `tumble eval … --shard` makes them");
         return Err(Failure::new(ALL_INPUTS, message));
     };
-    // Two processes that merge at once would remove each other's files.
+    // Two merging processes would remove each other's files, so the folder is locked.
     let opened = target::opened(folder)?;
     let _lock = manifest::lock(&opened)?;
     let progress = ShardProgress::of(folder, &recorded);
@@ -256,7 +256,7 @@ fn write(
     for line in lines {
         let text = match (line.file, &mut before) {
             (0, Some(before)) => {
-                // Mostly it is the next line, which the reader has buffered.
+                // Usually it is the next line, which the reader has already buffered: a relative seek keeps the buffer.
                 let step = line.at.start as i64 - at;
                 before.seek_relative(step).map_err(failed)?;
                 one.resize(line.at.len(), 0);
@@ -275,7 +275,7 @@ fn write(
                 kept[&shard].get(line.at.clone()).unwrap_or_default()
             }
         };
-        // A file that was replaced meanwhile has the same entries, maybe at other offsets.
+        // The file may have been replaced meanwhile by one with the same entries at other offsets.
         let is_whole =
             ManifestEntry::of_line(text).is_some_and(|entry| entry.output == line.output);
         if !is_whole {

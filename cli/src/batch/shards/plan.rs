@@ -238,7 +238,7 @@ impl RecordedPlan {
         };
         let mut bytes = Vec::new();
         let mut open = || {
-            // Files in it are written and removed: it must not be a link.
+            // Files in this folder are written and removed, so it must not be a link.
             parent_beneath(folder, &Self::name())?;
             open_beneath(folder, &Self::name())?
                 .take(MAX_PLAN_BYTES)
@@ -255,8 +255,8 @@ impl RecordedPlan {
         match (1..=inputs.min(MAX_SHARDS)).contains(&shards) {
             true => Ok(Some(recorded)),
             false => Err(refuse(&format!(
-                "it says {shards} shards of {inputs} inputs; each has one at least, and there are \
-                 {MAX_SHARDS} at most; remove it"
+                "it states {shards} shards of {inputs} inputs; a shard has at least one input, and there \
+                 are at most {MAX_SHARDS} shards; remove it"
             ))),
         }
     }

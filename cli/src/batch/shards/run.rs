@@ -81,7 +81,7 @@ impl<'a> Shard<'a> {
         let mut jobs = Vec::new();
         for (path, name) in paths.zip(names) {
             let target = name.clone().and_then(|name| {
-                // The plan has claimed the names of its results.
+                // The plan has already reserved the names of its results.
                 let destination = result_folder.destination(&name, true)?;
                 Ok(ResultTarget::new(
                     destination.hashed().marked(&mark),

@@ -168,7 +168,7 @@ fn of_format(
             }
             Ok(Vec::new())
         }),
-        // The next file is read while the current one is resampled, as in batches.
+        // As in batches, a second thread reads the next file while the current one is resampled.
         Contestant::new("resampling while the next is read", |_: &mut [Quat]| {
             thread::scope(|scope| {
                 let (hand_over, clips) = sync_channel(0);
@@ -224,7 +224,7 @@ fn forget(paths: &[PathBuf]) {
         .iter()
         .filter_map(|path| std::fs::File::open(path).ok())
     {
-        // Only what has reached the disk can be dropped.
+        // The system can only drop pages from its cache after they are written to the disk.
         let _ = file.sync_data();
         let _ = fadvise(&file, 0, None, Advice::DontNeed);
     }

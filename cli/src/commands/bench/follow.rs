@@ -56,7 +56,7 @@ fn double_reflection(workload: &Workload, track: usize, row: &mut [Quat]) {
     };
     let keys = path.keys;
     let last = keys.len() - 1;
-    // The times of the keys are even, where Bessel-Overhauser's slopes are Catmull-Rom's.
+    // At even key times, Bessel-Overhauser's slopes are those of Catmull-Rom.
     let inner = |i: usize| (keys[i + 1] - keys[i - 1]) * 0.5;
     let slope = |i: usize| match i {
         0 => (keys[1] - keys[0]) * 2.0 - inner(1),

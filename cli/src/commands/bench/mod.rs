@@ -85,12 +85,12 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
             continue;
         };
         for method in [method::SLERP, method::BESSEL_OVERHAUSER] {
-            // Paths are curves of one method.
+            // A path is a curve of one method, so it is measured once.
             if kind == WorkloadKind::Follow && method == method::SLERP {
                 continue;
             }
             words::note(&format!("measuring {kind:?}, {method} …").to_lowercase());
-            // A short call is repeated, so that the clock can see it.
+            // A short call is repeated in each measurement, because the clock is too coarse for a single call.
             let calls = match kind {
                 WorkloadKind::Small => (10_000 / arguments.rounds / arguments.shrink).max(1),
                 _ => 1,
@@ -144,7 +144,7 @@ fn measure(
             Ok(Vec::new())
         })
     };
-    // Segments of dense keys take gigabytes: there is room for them once.
+    // Segments of dense keys take gigabytes. They would not fit into memory for each device, so no clip is kept.
     let clips = match kind {
         WorkloadKind::Dense => Vec::new(),
         _ => (devices.iter())

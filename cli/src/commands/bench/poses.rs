@@ -39,7 +39,7 @@ fn of_tracks(
         options.kept_segments = Some(kept_segments);
         Engine::with_options(Device::Cpu, &options)?.upload(set, method)
     };
-    // Between the frames of the keys: on them there would be nothing to evaluate.
+    // Times between frames of the keys. At the keys, nothing would be evaluated.
     let played: &Vec<f64> = &(0..CALLS).map(|call| (call as f64 + 0.3) / RATE).collect();
     let mut shuffled = played.clone();
     Rng::with_seed(5).shuffle(&mut shuffled);

@@ -62,10 +62,10 @@ pub(crate) struct BenchRow {
     pub(crate) milliseconds: f64,
     million_rotations_per_second: f64,
     nanoseconds_per_rotation: f64,
-    /// Its speed beside what the section says.
+    /// Its speed relative to those that the section names.
     #[serde(flatten)]
     ratios: BTreeMap<&'static str, f64>,
-    /// Of a result that stays on a device: how fast it was written, beside what the device writes at most.
+    /// For a result that stays on a device: the speed of writing it, relative to the largest speed of the device.
     #[serde(skip_serializing_if = "Option::is_none")]
     share_of_device_write_rate: Option<f64>,
     /// Where the time went, milliseconds.

@@ -21,7 +21,7 @@ const SAMPLES: usize = 1_000_000;
 pub(crate) fn measure(shrink: usize, repetitions: Repetitions) -> Result<Vec<Section>, Failure> {
     let samples = (SAMPLES / shrink).max(2);
     let count = TRACKS * samples;
-    // One motion for all tracks: how long smoothing takes does not depend on it.
+    // All tracks have the same motion, because the duration of smoothing does not depend on the values.
     let motion = walk(&mut fastrand::Rng::with_seed(5), samples, 0.1);
     let mut rotations = OutputBuffer::new(count).map_err(no_memory)?;
     for track in rotations.chunks_exact_mut(samples) {

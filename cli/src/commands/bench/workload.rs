@@ -58,7 +58,7 @@ impl WorkloadKind {
                 frames(motion(scaled(4096), MOTION_KEYS), 0.0, count)
             }
             Self::Small => frames(uneven(4, 26, 500.0 / RATE), 0.0, 500),
-            // Half way between keys: on them there would be nothing to evaluate.
+            // Halfway between keys. At the keys, nothing would be evaluated.
             Self::Dense => frames(even(scaled(4096), 2400), 1.0 / 240.0, 1199),
             Self::Long => {
                 let keys = scaled(10_000_000).max(4);

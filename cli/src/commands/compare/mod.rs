@@ -72,7 +72,7 @@ pub(crate) struct Arguments {
     /// other than rotations, the largest difference of two numbers
     #[arg(long, value_name = "ANGLE", value_parser = degrees, allow_hyphen_values = true)]
     tolerance: Option<f64>,
-    /// The largest distance: that two translations may be apart
+    /// The largest distance: between corresponding translations
     #[arg(long, value_name = "LENGTH", value_parser = not_negative, allow_hyphen_values = true)]
     distance: Option<f64>,
     /// Align the second trajectory to the first by least squares, by these transformations
@@ -278,7 +278,7 @@ impl Arguments {
         let track = |clip: &Motion, name: &str| {
             let all = || (0..clip.set.track_count()).collect();
             let chosen = self.inputs.tracks.of(clip, name)?.unwrap_or_else(all);
-            // The other tracks of the clip are kept, because the position of a track depends on its ancestors.
+            // Keep all other tracks of the clip, because the position of a track depends on its ancestors.
             let &[track] = &chosen[..] else {
                 let message = format!(
                     "{name}: has {}; a path is one, choose it with --tracks",

@@ -150,7 +150,7 @@ impl EvaluationJob<'_> {
             let mut each = clips.iter();
             each.try_for_each(|clip| check_has_tracks(name, clip, remedy))?;
         }
-        // Writers of clips report themselves which data they cannot store.
+        // Writers of clips themselves report the data that they cannot store.
         if kind != ResultKind::Motion {
             self.warn_of_lost_channels(clips);
         }
@@ -318,7 +318,7 @@ impl EvaluationJob<'_> {
             ("input", name.to_owned()),
         ];
         let sha256 = self.work.input.file.sha256().map(str::to_owned);
-        // The hash is of the bytes that were read, or none.
+        // A file that changed since it was read has another hash, so that is an error.
         self.work.input.file.check_unchanged()?;
         notes.extend(sha256.map(|hash| ("input_sha256", hash)));
         Ok(notes)
@@ -575,15 +575,14 @@ impl EvaluationJob<'_> {
         ) = (self.work.input.loaded.document.clone(), self.samples)
         else {
             return Err(Failure::usage(format!(
-                "{name}: the animations of a file that is kept keep their lengths; leave out \
-                 --times, --at, --start, --end and --from-zero (`tumble convert --start` cuts a file first), or \
-                 write another format"
+                "{name}: in a copy of the file, animations keep their lengths; leave out --times, --at, --start, --end \
+                 and --from-zero (`tumble convert --start` cuts a file first), or write another format"
             )));
         };
         if self.arguments.command_line.has("max_gap") {
             return Err(Failure::usage(format!(
-                "{name}: the animations of a file that is kept keep all frames; leave out --max-gap, or write \
-                 another format"
+                "{name}: in a copy of the file, animations keep all frames; leave out --max-gap, or write another \
+                 format"
             )));
         }
         check_whole(self.work)?;
@@ -923,7 +922,7 @@ impl EvaluationJob<'_> {
             return Err(refused(message.to_owned()));
         }
         if !clip.has_vectors() {
-            // Tracks without translations are boxes of a chain, which need no skeleton.
+            // Tracks without translations are drawn as boxes of a chain, which need no skeleton.
             return Ok(Cow::Borrowed(clip));
         }
         let rest = Transform::default();
@@ -932,8 +931,7 @@ impl EvaluationJob<'_> {
             .map(|parent| Joint { parent, rest })
             .collect();
         if with_parents.has_unplaced_joints() {
-            let message =
-                "joints with a parent have no translations; they are written at their parents";
+            let message = "joints with a parent have no translations; their positions are those of their parents";
             self.work
                 .warn(Diagnostic::new(name, Code::NoOffsets, message));
         }

@@ -23,7 +23,7 @@ use crate::messages::listing;
 pub(crate) fn run(arguments: &Arguments, part: ShardSelection) -> Result<(), Failure> {
     let mut records = Vec::new();
     let outcome = run_shards(arguments, part, &mut records);
-    // As long as there are no records, the failure is the only one.
+    // If there are no records, the caller prints only the failure.
     if arguments.results.prints_json() && (outcome.is_ok() || !records.is_empty()) {
         listing::json(&records)?;
     }

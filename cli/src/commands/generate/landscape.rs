@@ -123,7 +123,7 @@ fn ball() -> TriangleMesh {
     let mut positions = vec![x, y, z, -x, -y, -z];
     let mut faces = Vec::new();
     for (a, b, c) in [(0, 1, 2), (1, 3, 2), (3, 4, 2), (4, 0, 2)] {
-        // Each upper face, and the one that z mirrors it to.
+        // Each triangle with the corner z, and its mirror image with the corner -z.
         faces.extend([[a, b, c], [b, a, c + 3]]);
     }
     for _ in 0..2 {

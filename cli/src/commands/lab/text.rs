@@ -43,7 +43,7 @@ pub(super) fn page(device: &str, seconds: f64, lab: &LabReport) -> String {
             times(ceiling.time)
         ));
     }
-    // Every kernel for typical runs; then other runs, if another variant than the engine's is faster.
+    // List every kernel for typical runs. List other runs only if a variant is faster than the engine's.
     let is_typical = |row: &&LabRow| row.run == 48 && !row.has_keys;
     let is_changed = |row: &&LabRow| row.winner.variant != row.today.variant;
     let rows = lab.rows.iter();

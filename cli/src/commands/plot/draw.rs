@@ -47,7 +47,7 @@ pub(crate) fn svg(figure: &Figure) -> io::Result<String> {
         (FontStyle::Normal, dejavu::sans::regular()),
         (FontStyle::Bold, dejavu::sans::bold()),
     ];
-    // Registered once; more often does no harm.
+    // Registering the fonts again for each plot does no harm.
     for (style, font) in styles {
         plotters::style::register_font(FONT, style, font)
             .map_err(|_| io::Error::other("the font built in cannot be read"))?;
@@ -67,7 +67,7 @@ pub(crate) fn svg(figure: &Figure) -> io::Result<String> {
     let fine = format!("<svg width=\"{fine_width}\" height=\"{fine_height}\"");
     Ok(text.replacen(
         &fine,
-        // Mitred joins would overshoot the corners of curves.
+        // Mitred joins would extend beyond the corners of curves.
         &format!("<svg width=\"{width}\" height=\"{height}\" stroke-linejoin=\"round\""),
         1,
     ))
@@ -77,7 +77,7 @@ pub(crate) fn svg(figure: &Figure) -> io::Result<String> {
 pub(crate) fn png(figure: &Figure) -> io::Result<Vec<u8>> {
     let canvas = picture::rasterise(&svg(figure)?, PIXELS as f32)?;
     let mut bytes = Vec::new();
-    // The ground is white, so that nothing is transparent.
+    // The background is white, so that no pixel is transparent.
     let pixels = picture::opaque(&canvas);
     picture::png(&mut bytes, canvas.width(), canvas.height(), &pixels)?;
     Ok(bytes)
@@ -353,7 +353,7 @@ impl Brush {
         panel: &Panel,
     ) -> Result<(), DrawingAreaErrorKind<DB::ErrorType>> {
         let (width, height) = area.dim_in_pixel();
-        // The title takes some of the height.
+        // Reserve some of the height for the title.
         let room = f64::from(self.px(24.0));
         let aspect = f64::from(width) / (f64::from(height) - room).max(1.0);
         let (x, y) = (1.1 * aspect.max(1.0), 1.1 * (1.0 / aspect).max(1.0));

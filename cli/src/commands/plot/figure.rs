@@ -105,7 +105,7 @@ pub(crate) fn range_of(values: impl IntoIterator<Item = f64>) -> Range<f64> {
     if low == 0.0 && high == 0.0 {
         return -1.0..1.0;
     }
-    // A constant gets a range around it.
+    // A constant curve gets a small range around its value, because the range must not be empty.
     let room = ((high - low) * 0.05).max(high.abs().max(1e-3) * 1e-3);
     low - room..high + room
 }

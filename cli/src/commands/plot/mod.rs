@@ -80,7 +80,8 @@ pub(crate) struct Arguments {
     /// What to draw [default: components; of files of paths, path]
     #[arg(long, value_enum, value_name = "WHAT")]
     show: Option<PlotQuantity>,
-    /// Only these components of rotations: `knee.x`, by the name of a track or its index from 0, and w, x, y or z
+    /// Draw only these components of rotations, such as `knee.x`: a track (its name, or its index from 0) and w, x, y
+    /// or z; `tumble info --json` lists the tracks
     #[arg(
         long,
         value_name = "LIST",
@@ -189,7 +190,7 @@ enum PlotOutput {
 
 /// Says where curves are less smooth than their methods promise.
 fn note_curves(name: &str, clip: &Motion, choices: &[CurveChoice]) {
-    // No file asks for such a method.
+    // Only methods that the user named, because no file states a method that causes these warnings.
     let named = choices.iter().filter_map(|choice| choice.method.0);
     let interpolations = named.map(|method| choices[0].interpolation(method));
     let warnings = interpolations.filter_map(|one| curve_warning(name, clip, &one));

@@ -85,8 +85,7 @@ pub(super) fn figure(
                 .iter()
                 .flat_map(|curve| curve.pieces.iter().flatten())
         };
-        // The roll of a body that never rolls is only rounding. A smallest range prevents that rounding fills the
-        // panel.
+        // If a body never rolls, its roll is only rounding. With a smallest range, rounding does not fill the panel.
         let least = if matches!(show, PathQuantity::Roll) {
             [-1.0, 1.0]
         } else {
@@ -181,7 +180,7 @@ mod tests {
                     Quat::from_rotation_y(angle(time)) * roll
                 })
                 .collect(),
-            // Faces along z at first, and goes round y.
+            // The body first faces along z, then goes around y.
             positions: (times.iter())
                 .map(|time| Vec3::new(-angle(time).cos(), 0.0, angle(time).sin()) * 4.0)
                 .collect(),

@@ -78,7 +78,7 @@ impl<'a> PlotSource<'a> {
         if let SampleChoice::Rate { .. } = samples.request
             && let Some(span) = set.time_span()
         {
-            // A box alone has the frames of the whole set.
+            // If only one box is drawn, it still has the frames of the whole set.
             frames = frames.spanning(span);
         }
         let mut timeline = resolve(&frames)?;

@@ -64,7 +64,7 @@ impl ComponentSelector {
         let found = named.or_else(|| self.track.parse().ok().filter(|&track| track < count));
         let track = found.ok_or_else(|| {
             Failure::usage(format!(
-                "{name}: --components: there is no track `{}`; it has {}, `tumble info --json` names them",
+                "{name}: --components: there is no track `{}`; it has {} (`tumble info --json` lists them)",
                 self.track,
                 words::count(count, "track")
             ))

@@ -19,8 +19,8 @@ pub(crate) fn program() -> Program {
     }
     Program {
         version: env!("CARGO_PKG_VERSION"),
-        // Set by the script that builds releases (`scripts/card.sh`): a build that asked for it itself would
-        // compile the program again after every commit.
+        // `scripts/card.sh`, which builds releases, sets this variable. If a build script asked for the commit, every
+        // commit would compile the program again.
         commit: option_env!("TUMBLE_COMMIT").unwrap_or("unknown"),
         kernels: hexadecimal(&kernels.finalize()),
         golden_table: hexadecimal(&Sha256::digest(Golden::table())),
@@ -82,12 +82,12 @@ pub(crate) fn now() -> String {
 /// A time in seconds since 1970, by the Gregorian calendar (Howard Hinnant's `civil_from_days`).
 fn date(seconds: u64) -> String {
     let (days, second) = (seconds / 86_400, seconds % 86_400);
-    // Days since 1 March of the year 0, in which each 400 years begin alike.
+    // Days since 1 March of year 0. From there, all periods of 400 years have the same length.
     let days = days + 719_468;
     let (era, day) = (days / 146_097, days % 146_097);
     let year = (day - day / 1460 + day / 36_524 - day / 146_096) / 365;
     let day = day - (365 * year + year / 4 - year / 100);
-    // Months from March.
+    // The month, counted from March.
     let month = (5 * day + 2) / 153;
     let day = day - (153 * month + 2) / 5 + 1;
     let (month, next_year) = if month < 10 {

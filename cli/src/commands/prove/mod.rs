@@ -60,7 +60,7 @@ pub(crate) struct Arguments {
     /// Run everything again under the Khronos validation layer; any message is a failure
     #[arg(long)]
     validate: bool,
-    /// Use the lanes that `tumble lab` chose: its report
+    /// Use the numbers of lanes in this report of `tumble lab`
     #[arg(long, value_name = "FILE")]
     lab: Option<PathBuf>,
     #[command(flatten)]

@@ -122,7 +122,7 @@ pub(crate) struct KernelSection {
     pub(crate) values: u64,
     /// Those whose bits differ.
     pub(crate) differing: Vec<DifferingValues>,
-    /// Those that did not run.
+    /// The names of those that did not run.
     pub(crate) missing: Vec<String>,
 }
 
@@ -466,7 +466,7 @@ pub(crate) fn write(report: &impl Serialize, path: &Path) -> Result<(), Failure>
     file.write_all(text.as_bytes())
         .map_err(|error| failed(&error))?;
     let kept = file.persist(path).map_err(|error| failed(&error.error))?;
-    // Temporary files are for their owner alone; results are as other files.
+    // A temporary file is readable only by its owner; the report gets the usual permissions.
     #[cfg(unix)]
     {
         use std::os::unix::fs::PermissionsExt as _;

@@ -321,7 +321,7 @@ impl ProofRun<'_> {
         for (setting, engine) in self.settings.iter().zip(&self.engines) {
             let reads = setting.options.reads;
             let texels = engine.choices().map(|choices| choices.reads) == Some("texel-buffers");
-            // Those that this device can run, in the variants that it runs.
+            // The kernels that this device can run, in the variants that the engine uses.
             let all = engine.known_kernels().into_iter().map(|check| check.name);
             let known = expected.len();
             expected.extend(all.filter(|name| name.ends_with("_texels") == texels));
@@ -510,7 +510,7 @@ impl ProofRun<'_> {
 
     fn compile(&mut self) -> Result<(), StepError> {
         let limit = self.left_until(COMPILED_BY);
-        // A figure that does not affect the verdict.
+        // A measurement that does not affect the verdict.
         match compile::measure(&self.vulkan.info().uuid, limit) {
             Ok(times) => self.proof.compile_times = times,
             Err(reason) => words::warning(&reason),
@@ -537,7 +537,7 @@ impl ProofRun<'_> {
         options.allow_inexact = true;
         let engine = Engine::with_options(device, &options)?;
         let mut found = ValidationSection::default();
-        // Cases far from each other, so that all kinds come where the time is short.
+        // Cases in large steps, so that all kinds of cases occur even if the time is short.
         let (count, step) = (self.golden.case_count(), 101);
         for index in 0..count {
             if index >= 24 && self.is_past(VALIDATED_BY) {

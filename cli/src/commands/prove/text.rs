@@ -250,7 +250,7 @@ fn speed(proof: &Proof, text: &mut String) {
     );
     let _ = writeln!(
         text,
-        "  bus: up {}, down {}; submitting nothing and seeing its fence {}",
+        "  bus: up {}, down {}; an empty submission until its fence {}",
         rate(figures.upload_rate),
         rate(figures.download_rate),
         time(figures.submit_and_fence)

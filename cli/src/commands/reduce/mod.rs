@@ -67,12 +67,11 @@ pub(crate) struct Arguments {
     /// How to interpolate: the curve that joins the remaining keys
     #[arg(id = "method", short, long = "method", alias = "curve", value_name = "METHOD", default_value_t, value_parser = curve())]
     method: ReducedCurve,
-    /// glTF: store rotations with 16 bits per component instead of f32. The errors are those of the file
-    /// as it is read back
+    /// glTF: store rotations with 16 bits per component instead of f32. The reported errors include this rounding
     #[arg(long)]
     quantize: bool,
-    /// glTF: write a new file, compressed by meshopt; players need `EXT_meshopt_compression`. With
-    /// --quantize, all samples become keys with as few bits as the bounds allow, where that is smaller
+    /// glTF: write a new file, compressed by meshopt; players need `EXT_meshopt_compression`. With --quantize, all
+    /// samples become keys with as few bits as the bounds allow, if that makes the file smaller
     #[arg(long)]
     meshopt: bool,
     /// Frames per second: sample at this rate first [default: the keys are the samples]
@@ -283,8 +282,8 @@ impl Arguments {
                 .any(|channel| channel.has(ChannelInterpolation::Cubic)) =>
             {
                 return Err(Failure::usage(format!(
-                    "{name}: its keys are joined by cubics with tangents, so they are not its \
-                     samples; give --fps"
+                    "{name}: its keys are connected by cubics with tangents, so the keys alone are not \
+                     enough; give --fps"
                 )));
             }
             None => clip,
@@ -336,7 +335,7 @@ impl Arguments {
                 ..ends.of(&reduced.clip, None, &[])
             }];
             let mut bytes = Vec::new();
-            // The writer warns of data that cannot be written.
+            // The writer itself warns of data that it cannot store.
             let written = format.map(|format| format.write_clips(&sampled, &options, &mut bytes));
             Ok(written
                 .and_then(Result::ok)
@@ -391,7 +390,7 @@ impl Arguments {
             ("input", name.to_owned()),
             ("tolerance", format!("{}°", self.tolerance)),
         ];
-        // Formats of frames take the keys where every frame has one.
+        // Formats without times need the rate: they can store the keys if every frame has one.
         let has_times = format.supports(Feature::UnevenTimes);
         let rate = |clip: &Motion| clip.rate.filter(|_| !has_times);
         let both = reduced.iter().zip(&samples);

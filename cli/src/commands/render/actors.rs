@@ -96,7 +96,7 @@ impl Subject {
             return Err(Failure::new(ALL_INPUTS, format!("{name}: {message}")));
         }
         let count = timeline.len();
-        // The times from which the position of the camera is computed.
+        // Every n-th frame, to find the visible extent that determines the position of the camera.
         let seen = || (0..count).step_by(count.div_ceil(REACHES).max(1));
         let at = |frame: usize| frame * tracks..(frame + 1) * tracks;
         let (shape, reach) = match &self.mesh {

@@ -192,7 +192,7 @@ impl Scene {
             style.view.above.to_radians(),
         );
         let orientation = Quat::from_euler(EulerRot::YXZ, around, -above, 0.0);
-        // Actors stand beside each other as they are seen.
+        // Actors stand side by side as the camera sees them.
         let right = orientation * Vec3::X;
         let sides = reach().chain(ground()).map(|end| end.dot(right));
         let (left_end, right_end) = sides.fold((f32::MAX, f32::MIN), |(left, right), side| {
@@ -206,7 +206,7 @@ impl Scene {
             .collect();
         let centre = (low + high) / 2.0;
         let aspect = style.size.0 as f32 / style.size.1 as f32;
-        // Names are below the actors, which move up by half of the names' height.
+        // Names are drawn below the actors, so the actors move up by half of the names' height.
         let below = match actors.iter().any(|actor| !actor.name.is_empty()) {
             true => overlay::Labels::share(style.size.1),
             false => 0.0,
@@ -254,7 +254,7 @@ impl Scene {
                 if let Some(floor) = shadowed {
                     camera.add(&mut corners, &face.shadow(floor, theme.shadow), shift, 0.0);
                 }
-                // A curve on the ground would be half in it: it is drawn a little nearer to the eye.
+                // A curve on the ground would be half hidden in it, so it is drawn slightly nearer to the camera.
                 camera.add(&mut corners, face, shift, 0.06 * length);
             }
         }

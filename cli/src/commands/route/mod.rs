@@ -66,7 +66,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     for outcome in &outcomes {
         warn_of_moved_ends(outcome, surface.size());
     }
-    // Drawn before anything is written, so that an error of drawing leaves no file.
+    // Drawn before any file is written, so that no file is left if drawing fails.
     let picture = match results.plot() {
         None => None,
         Some(destination) => {

@@ -60,7 +60,8 @@ struct TopView {
 
 impl TopView {
     fn new(up: DVec3, mesh: &Mesh) -> Self {
-        // With z upwards x runs to the right and y away; with y upwards z runs towards the eye.
+        // If z points up, x points to the right and y away from the viewer. If y points up, z points towards the
+        // viewer.
         let other = if up.x.abs() < 0.9 { DVec3::X } else { DVec3::Y };
         let right = (other - other.dot(up) * up).normalize_or(DVec3::X);
         let down = right.cross(up);

@@ -238,7 +238,7 @@ fn smoothed(
     {
         // A smoothing kernel needs evenly spaced samples, so an additional key at the end is not possible.
         words::warning(&format!(
-            "{name}: the {} s after the last frame are left out; with a rate that has a frame at the end they are kept",
+            "{name}: the {} s after the last frame are left out; a rate (--fps) with a frame at the end keeps them",
             words::seconds(end - last)
         ));
     }

@@ -34,7 +34,7 @@ pub(crate) fn find_ghosts(shown: &[ShownClip]) -> FoundGhosts {
         ghosts: Vec::new(),
         notes: Vec::new(),
     };
-    // The clips of an input follow each other.
+    // The clips of one input are consecutive.
     let mut inputs: Vec<(usize, &[ShownClip])> = Vec::new();
     let mut start = 0;
     for clips in shown.chunk_by(|one, next| one.file == next.file) {

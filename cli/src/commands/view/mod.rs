@@ -103,7 +103,7 @@ pub(crate) struct Arguments {
     /// Where to end, seconds [default: the last key]
     #[arg(long, value_name = "SECONDS", value_parser = finite_seconds, allow_hyphen_values = true)]
     end: Option<f64>,
-    /// Show one input at a time, chosen in a menu, instead of the others as ghosts beside it
+    /// Show one input at a time, chosen in a menu, without the others as ghosts
     #[arg(long)]
     no_ghosts: bool,
     /// Leave the engine and the full keys out of the page: it is smaller, and shows only the requested
@@ -374,7 +374,7 @@ impl Arguments {
         }
         drop(progress);
         let meshes = self.scenery.read()?;
-        // The animations of a file mostly move one mesh.
+        // The animations of a file usually move the same mesh, so it is stored once.
         let mut skins: Vec<&CarriedMesh> = Vec::new();
         for (one, set) in shown.iter().zip(&mut sets) {
             if let Some(mesh) = &one.mesh {

@@ -293,7 +293,7 @@ impl<'a> Page<'a> {
 
     pub(crate) fn html(&self) -> String {
         let data = serde_json::to_string(self).expect("names are strings and numbers are numbers");
-        // Nothing in it may end the element that holds it.
+        // The data must not contain the end tag of its HTML element.
         HTML.replacen(PLACEHOLDER, &data.replace('<', "\\u003c"), 1)
     }
 }

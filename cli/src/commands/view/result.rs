@@ -68,7 +68,7 @@ impl StoredResult {
         if !positions().all(DVec3::is_finite) {
             return None;
         }
-        // A coordinate that is always the same has no size to be divided by.
+        // A coordinate that never changes has the range 0, by which one cannot divide.
         let scale = DVec3::select(size.cmpgt(DVec3::ZERO), 65535.0 / size, DVec3::ZERO);
         let short = |position: DVec3| {
             let share = (position - low) * scale;

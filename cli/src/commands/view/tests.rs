@@ -160,7 +160,8 @@ fn joints_are_drawn_where_the_engine_puts_them() {
         let methods = page.value(&texts("#method option"));
         let authored = MethodChoice(None);
         let has_channels = !one.clip.channels.is_empty();
-        // Where `authored` was shown before and means nothing, the first method is shown instead.
+        // If `authored` was selected for the clip before and this clip states no interpolation, the first method is
+        // selected.
         let first = match has_channels {
             true => "authored",
             false => "bessel-overhauser",
@@ -178,7 +179,7 @@ fn joints_are_drawn_where_the_engine_puts_them() {
             let positions = || expected.iter().map(|pose| pose.position);
             let size =
                 positions().reduce(DVec3::max).unwrap() - positions().reduce(DVec3::min).unwrap();
-            // Half a step of 16 bits, and the rounding of f32, in which matrices are.
+            // Half a step of 16 bits, plus the rounding of the matrices to f32.
             let tolerance = size.max_element() / 65535.0 / 2.0 + 1e-5;
             let drawn = page.value(&format!(
                 "Array.from(tumble.state.input.times, (time) => {{ tumble.seek(time); \
@@ -232,7 +233,7 @@ fn joints_have_names_and_a_click_chooses_one() {
     page.value("tumble.loaded().then(() => true)");
     assert_eq!(page.value("JSON.stringify(tumble.ends(0))"), before);
 
-    // Light blue is the fifth joint's; a pixel inside it has such ones all round.
+    // The fifth joint is light blue. A pixel inside the joint has only light blue neighbours.
     let (pixels, width) = page.pixels("#stage");
     let light_blue = |[r, g, b]: [u8; 3]| r > 25 && b / 2 > r && g > r + r / 2;
     let inside = (2 * width + 2..pixels.len() - 2 * width - 2).find(|&at| {
@@ -244,7 +245,7 @@ fn joints_have_names_and_a_click_chooses_one() {
     let (x, y) = ((at % width) as f64, (at / width) as f64);
     page.click_at(area[0].as_f64().unwrap() + x, area[1].as_f64().unwrap() + y);
     page.wait(&format!("tumble.state.picked && {name} === 'shin.r'"));
-    // The values shown are those of the joint's rotation.
+    // The numbers on the page must be those of the joint's rotation.
     let text = page.value(
         "tumble.seek(0.5), document.querySelector('#box-values').textContent.replaceAll('−', '-')",
     );

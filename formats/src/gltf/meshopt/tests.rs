@@ -93,7 +93,7 @@ fn quaternions_of_any_precision_are_decoded() {
         quaternion(&mut bytes);
         bytemuck::cast::<_, [i16; 4]>(bytes).map(i16::from_le)
     };
-    // One is 2047 in 12 bits; x is left out, then w.
+    // In 12 bits, 1.0 is 2047. The component that is left out is x, then w.
     assert_eq!(decoded([0, 0, 0, 2044]), [32767, 0, 0, 0]);
     assert_eq!(decoded([2047, 0, 0, 2047]), [23170, 0, 0, 23170]);
     assert_eq!(
@@ -188,7 +188,7 @@ fn what_is_no_such_stream_is_refused() {
     assert_eq!(decode(&[]), Err(Version(0)));
     assert_eq!(decode(&[0xa2; 100]), Err(Version(0xa2)));
     for (stream, per_byte) in STREAMS.into_iter().zip([64, 1024]) {
-        // More elements than so many bytes can be the streams of, and more than memory.
+        // More elements than these bytes can encode, and more than fit into memory.
         for count in [per_byte * stream.len() / STRIDE + 1, usize::MAX] {
             let error = decode_attributes(stream, count, STRIDE, Filter::None);
             assert!(matches!(error, Err(Short { .. })), "{error:?}");
@@ -226,7 +226,7 @@ fn the_shortest_streams_are_accepted_and_no_byte_less() {
         let mut stream = vec![0; 1 + body + tail];
         stream[0] = header;
         if header == 0xa1 {
-            // All bytes of both blocks stay as they are.
+            // Do not change the bytes of both blocks.
             stream[1..1 + body].fill(0b1010_1010);
         }
         assert_eq!(decode(&stream), Ok(vec![0; COUNT * STRIDE]));

@@ -114,7 +114,7 @@ impl NewNodes {
             }
         }
         for (track, parent) in parents.iter().enumerate() {
-            // Nodes that are shared have their parents already.
+            // Shared nodes were given their parents before.
             if nodes[track] >= self.children_until {
                 let child = self.below_origin(nodes[track]);
                 match parent.map(|parent| nodes[parent]) {
@@ -168,7 +168,7 @@ impl NewNodes {
             let parent = match parents[track] {
                 None => None,
                 Some(parent) => match found[parent] {
-                    // Every child of a new node is new.
+                    // If the parent is a new node, its children are new nodes, too.
                     None => continue,
                     some => some,
                 },

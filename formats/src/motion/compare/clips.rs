@@ -308,7 +308,7 @@ impl ClipPair<'_> {
         let (sampled, origins) = ([first, second], [of_first, of_second]);
         let times = &sampled[0].times;
         let counts = motions.map(|clip| clip.set.track_count());
-        // Differences at [sample][pair].
+        // Computes the differences, ordered by sample, then by pair.
         let each = || {
             let samples = 0..times.len();
             samples.flat_map(|sample| {
@@ -510,7 +510,7 @@ impl ClipPair<'_> {
     fn single_track_assumption(&self) -> Option<String> {
         let [first, second] = self.clips.map(|clip| {
             let name = clip.set.get(0)?.name?;
-            // Readers of trajectories make up this name.
+            // Readers of trajectories add this name, so it does not name a joint.
             (name != TRAJECTORY_TRACK && clip.set.track_count() == 1).then_some(name)
         });
         let (first, second) = (first?, second?);
@@ -544,7 +544,7 @@ impl ClipPair<'_> {
     /// The tracks of both clips, matched.
     fn matched_joints(&self) -> Result<MatchedJoints, JointMatchError> {
         let joints = self.clips.map(Motion::joints);
-        // Two tracks need no name to tell them apart.
+        // If both clips have one track, these are compared whatever their names are.
         let matched = if joints.iter().all(|side| side.len() == 1) {
             JointPairs::in_order(1)
         } else {

@@ -142,7 +142,7 @@ impl PathDifference {
         let names = clips.map(|(name, _, _)| name);
         let inputs = || names.map(str::to_owned);
         let first = clips[0].1;
-        // A path of one track is of a body in the world.
+        // A single track is a body in the world, so parents matter only if there are several tracks.
         if clips.iter().all(|(_, clip, _)| clip.set.track_count() > 1) {
             let motions = clips.map(|(_, clip, _)| clip);
             check_known_parents(names, motions, &[clips.map(|(_, _, track)| track)])?;
@@ -281,7 +281,7 @@ fn associate(times: [&[f64]; 2], measure: &PathMeasure) -> Association {
     let start = times.map(|times| times.first().copied().unwrap_or(f64::INFINITY));
     let end = times.map(|times| times.last().copied().unwrap_or(f64::NEG_INFINITY));
     let common = start[0].max(start[1])..=end[0].min(end[1]);
-    // As in evo: all poses count, and if both have equally many, the second is used.
+    // As in evo: all poses of the shorter trajectory count; if both have equally many, those of the second.
     let counts = match measure.associate {
         Associate::Nearest(_) => times.map(<[f64]>::len),
         Associate::Interpolated => {

@@ -37,9 +37,7 @@ pub enum EndFrameError {
         format: &'static str,
     },
     /// The format has times in a separate file, which is not written.
-    #[error(
-        "{format} stores the times of its frames in a separate file alone, and none is written"
-    )]
+    #[error("{format} stores the times of frames only in a separate file, and none is written")]
     NoFileOfTimes {
         /// The name of the format.
         format: &'static str,

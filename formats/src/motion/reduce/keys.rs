@@ -84,7 +84,7 @@ impl Reduction<'_> {
                     Channel::Scale => &self.samples.scales,
                 };
                 let samples = self.of_joint(samples, joint);
-                // A step of a power of two is exact, and leaves zeros at the end of f32.
+                // Rounding to a power of two is exact, and the lowest bits of f32 become 0.
                 let step = libm::log2(self.distance / 64.0).floor().clamp(-60.0, 60.0);
                 let step = match channel {
                     Channel::Translation if self.distance > 0.0 => libm::exp2(step),
@@ -112,12 +112,12 @@ impl Reduction<'_> {
     ) -> Result<Vec<ReducedKeys<DQuat>>, ReduceMotionError> {
         let joints = self.parents.len();
         let mut rotations = vec![ReducedKeys::default(); joints];
-        // How each joint is turned in the world after the reduction, `[joint][sample]`.
+        // The world rotation of each joint after the reduction, `[joint][sample]`.
         let mut in_world: Vec<Vec<DQuat>> = vec![Vec::new(); joints];
         for &joint in &self.order {
             let parent = self.parents[joint];
             let sampler = self.sampler(joint).rotation;
-            // Joints that step or rest stay as they are; the others make up for the change of their parents.
+            // Joints that step or rest do not change. Other joints compensate for the change of their parents.
             let target: Vec<DQuat> = match parent {
                 Some(parent) if !matches!(sampler, None | Some(ChannelInterpolation::Step)) => {
                     let poses = self.poses.iter().skip(joint).step_by(joints);
@@ -257,7 +257,8 @@ impl Reduction<'_> {
         self.clip.set.vector_keys(channel, joint)?;
         let (samples, tolerance) = match channel {
             Channel::Translation => (&self.samples.translations, tolerances.distances[joint]),
-            // A scale moves the children of the joint as far as an angle of that size would.
+            // A change of the scale by some number moves the children of the joint as far as a rotation by this number
+            // in rad.
             Channel::Scale => (&self.samples.scales, tolerances.angles[joint]),
         };
         let stored = self.of_joint(samples, joint);
@@ -279,7 +280,7 @@ impl Reduction<'_> {
             Some(ChannelInterpolation::Step) => steps(samples),
             _ => reduce_rotations(&self.times, samples, tolerance, self.options.curve)?,
         };
-        // A clip lasts as long as its keys: one joint at least has a key at its end.
+        // A clip ends at its last key, so at least one joint needs a key there.
         let is_keyed = |joint: &&usize| self.sampler(**joint).rotation.is_some();
         let mut keys = keys;
         if self.order.iter().find(is_keyed) == Some(&joint) {
@@ -362,7 +363,7 @@ impl Reduction<'_> {
         let name = track.and_then(|track| track.name).unwrap_or_default();
         match self.sampler(joint).rotation {
             Some(_) => push_rotations(&mut reduced.set, name, &self.times, keys),
-            // The joint rests: it keeps its single key.
+            // The joint does not move: it keeps a single key.
             None => {
                 let (times, keys) =
                     track.map_or((&[][..], &[][..]), |track| (track.times, track.keys));

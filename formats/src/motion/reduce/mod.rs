@@ -230,7 +230,7 @@ impl<'a> Reduction<'a> {
         let samples =
             ChannelMethods::AUTHORED.sample(engine, clip, &SampleTimes::at(times.clone()))?;
         let joints = clip.set.track_count();
-        // Where poses in the world cannot be computed, each track is reduced relative to its parent.
+        // If poses in the world cannot be computed, each track is reduced without its parent.
         let hangs = clip.no_world.is_none() && !clip.is_world;
         let parents: Vec<Option<usize>> = (0..joints)
             .map(|joint| clip.skeleton.get(joint)?.parent.filter(|_| hangs))
@@ -385,7 +385,7 @@ fn quantized(clip: &Motion, quantization: Quantization) -> Result<Motion, TrackE
     let mut short = clip.without_tracks().with_scalars_of(clip, 1.0)?;
     for (index, track) in clip.set.tracks().enumerate() {
         let keys: Vec<Quat> = match clip.channels.get(index).map(|channels| channels.rotation) {
-            // A node's rest pose is f32, and tangents may be longer than 16 bits take.
+            // The rest pose of a node is stored in f32, and tangents may be too long for 16 bits.
             Some(None | Some(ChannelInterpolation::Cubic)) => track.keys.to_vec(),
             _ => {
                 let keys = track.keys.iter();

@@ -206,7 +206,7 @@ impl ArchivePlan {
             let frames = times.split_last().map_or(&[][..], |(_, frames)| frames);
             frames.len() > 1 && are_frames(frames, rate)
         });
-        // Times in f64, as we write them, were not rounded, and are read back as they are.
+        // Times in f64 were not rounded, so they are used as they are.
         let found = if is_f32 && !options.raw_times {
             grid::restore(std::slice::from_mut(&mut times), precision)
         } else {

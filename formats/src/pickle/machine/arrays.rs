@@ -131,7 +131,7 @@ impl Machine<'_> {
             return Err(self.damaged(message));
         }
         match (&*shape, items) {
-            // `numpy.save` of a dict and the like.
+            // An array of one object, as `numpy.save` stores a dict: only the object is kept.
             ([], &[only]) => Ok(Node::Same(only)),
             ([_, rows @ ..], _) if !rows.is_empty() && count != Some(0) => {
                 let items = items.to_vec();
@@ -280,7 +280,7 @@ impl Machine<'_> {
     pub(in crate::pickle) fn build_chumpy(&self, state: NodeId) -> Result<Node, Diagnostic> {
         Ok(match self.get(state, "x") {
             Some(values) => Node::Same(values),
-            // A formula.
+            // Without `x`, the object is a formula of chumpy, which is not evaluated.
             None => Node::Inert(Box::new(Inert {
                 class: ClassName {
                     module: "chumpy.ch".to_owned(),

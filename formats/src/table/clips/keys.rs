@@ -107,7 +107,7 @@ impl TableClip<'_> {
             // If the system refuses to start threads, this thread does all the work.
             .unwrap_or_else(|_| alone()),
         };
-        // Tracks that share columns are read together, so that warnings are in the order of the rows.
+        // Tracks with the same columns are read together, so that warnings are in the order of the rows.
         let mut known: Option<(&Parts, AllKeys)> = None;
         let keys = shared.tracks.iter().zip(quiet).map(|(track, quiet)| {
             if let Some(keys) = quiet {

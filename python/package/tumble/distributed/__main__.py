@@ -52,7 +52,7 @@ VALUES = {
     "--into": "files",
 }
 FLAGS = ("--resume", "--overwrite", "--json")
-# Options that have another form here, or none.
+# Options of the program that have another form here, or do not exist.
 REFUSED = ("-o", "--output", "--out", "--files-from", "--shard", "--pipes")
 FILES = ("--times", "--offsets")
 
@@ -100,7 +100,7 @@ def _run(arguments: list[str]) -> int:
         resume="--resume" in flags,
         overwrite="--overwrite" in flags,
         progress=watch,
-        # Ray has set its own when it started a node.
+        # Ray sets its own signal handlers when it starts a node.
         begin=_stop_on_signals,
     )
     watch.end()

@@ -11,7 +11,7 @@ from tumble import _tumble
 from tumble.distributed._job import ALL_INPUTS, DistributedError
 from tumble.distributed._stores import Store, read_text, store
 
-# Objects that are read at once; each waits for the network most of its time.
+# The number of objects that are read at the same time. Reading mostly waits for the network.
 _AT_ONCE = 16
 
 

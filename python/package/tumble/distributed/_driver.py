@@ -32,18 +32,18 @@ from tumble.distributed._job import (
 )
 from tumble.distributed._stores import Store, check_names, objects, put_text, read_text, store
 
-# So many tasks for each processor wait for one. With four, half a minute's work was with a machine
-# that went; with 32 no pause was seen.
+# The number of tasks that are queued for each processor. With 4, a lost machine had half a minute of work; with 32, no
+# processor was idle.
 _IN_FLIGHT = 32
 
-# After so many of them is asked at once.
+# The largest number of tasks whose end is queried in one call.
 _ASKED = 256
 
-# How often a task is tried on other workers, and then how often a shard is taken apart.
+# The number of retries of a task on other workers, and of divisions of a shard after that.
 _RETRIES = 3
 _ROUNDS = 4
 
-# How often the cluster is asked how many processors it has.
+# The interval in which the number of processors of the cluster is queried [s].
 _ASK = 2.0
 
 
@@ -118,7 +118,8 @@ def connected(address: str | None) -> Iterator[Any]:
     """Ray: the cluster at an address, the one of this machine, else one that is started for this
     call. A connection that is there is used, and left."""
     os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
-    # A node that is started here gives up what is beyond its memory; without end is Ray's default.
+    # If a task needs more memory than the node has, Ray repeats it without end by default. Here it gives up after 3
+    # times.
     os.environ.setdefault("RAY_task_oom_retries", "3")
     try:
         ray: Any = importlib.import_module("ray")
@@ -304,8 +305,8 @@ class _Driver:
         self._room = 0
 
     def run(self) -> None:
-        # Where this ends early, closing the connection ends the tasks, and shards that are done have
-        # said so. They are not cancelled: Ray 2.60 aborts a driver whose task ends as it is cancelled
+        # If this ends early, the connection is closed, which ends the tasks; finished shards have written their
+        # records. Tasks are not cancelled, because Ray 2.60 aborts a driver if a task ends while it is cancelled
         # ("Tried to complete task that was not pending").
         while self._is_unfinished():
             self._submit()
@@ -360,9 +361,9 @@ class _Driver:
             of = f"shard {task.shard} of {self._job.shards}"
             options: dict[str, Any] = {
                 "name": f"tumble: {of}, a part of it" if task.is_trial else f"tumble: {of}",
-                # A verdict wants more than one worker's end.
+                # An input counts as fatal only if several workers end with it, so the last trial is repeated.
                 "max_retries": 0 if task.is_trial and not self._is_last(task) else _RETRIES,
-                # An object store that does not answer is another matter than a clip.
+                # If an object store does not answer, the task is repeated: the clip is not the cause.
                 "retry_exceptions": [OSError],
                 "num_cpus": 1,
             }
@@ -386,7 +387,7 @@ class _Driver:
     def _collect(self) -> None:
         if not self._running:
             return
-        # Asking after thousands at once takes longer than they do, and the oldest mostly end first.
+        # Querying thousands of tasks takes longer than running them, and the oldest usually end first.
         oldest = list(itertools.islice(self._running, _ASKED))
         ready, rest = self._ray.wait(oldest, num_returns=1, timeout=0.05, fetch_local=False)
         if ready and rest:

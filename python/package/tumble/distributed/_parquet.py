@@ -9,7 +9,7 @@ from typing import Any
 
 from tumble.distributed._job import USAGE, DistributedError
 
-# Rows of so many bytes become a row group.
+# A row group is written when its rows have this many bytes.
 _GROUP = 64 << 20
 
 

@@ -83,7 +83,7 @@ class _Files:
     def put(self, source: str, name: str) -> None:
         path = self._path(name)
         os.makedirs(os.path.dirname(path), exist_ok=True)
-        # As the program calls its temporary files, so that merging sweeps them.
+        # The same pattern as the program's temporary files, so that merging removes them.
         number, temporary = tempfile.mkstemp(".part", ".tumble-shard-", os.path.dirname(path))
         try:
             with open(source, "rb") as file, open(number, "wb") as out:
@@ -149,7 +149,7 @@ class _Objects:
 
     def put(self, source: str, name: str) -> None:
         path = self._path(name)
-        # An object is there once its upload has ended; in a file system a name is given last.
+        # An object exists only after its upload has ended. In a file system, a file gets its final name at the end.
         whole = self._file_system.type_name in ("s3", "gcs", "abfs")
         temporary = path if whole else f"{path}.tumble-{os.getpid()}.part"
         if not whole:

@@ -50,8 +50,8 @@ def run(job: Job, task: Task) -> Entry:
     return {**reply, **outcome, "seconds": time.monotonic() - started}
 
 
-# The state that a worker process keeps: its engine, by the options and the device that it was opened with; the
-# last manifest that it read; the UUID of each card.
+# The state of a worker process: its engine (by the options and the device with which it was opened), the last manifest
+# that was read, and the UUID of each card.
 _WORKERS: dict[tuple[tuple[str, ...], str], _tumble.Worker] = {}
 _MANIFESTS: dict[tuple[str, int | None], dict[str, list[str]]] = {}
 _UUIDS: dict[str, str] = {}
@@ -106,7 +106,7 @@ def _inputs(job: Job, task: Task) -> Iterator[list[tuple[str, str]]]:
         for path, below in inputs:
             target = os.path.join(folder, path)
             os.makedirs(os.path.dirname(target), exist_ok=True)
-            # A file that is missing or may not be read is an error of the evaluation, which names the input.
+            # If a file is missing or cannot be read, the evaluation reports the error with the name of the input.
             with contextlib.suppress(FileNotFoundError, PermissionError):
                 source.fetch(below, target)
                 _fetch_referred(source, below, target)
@@ -163,7 +163,7 @@ def _run(
             else:
                 for name, _, _ in record.results():
                     out.put(os.path.join(folder, name), name)
-            # The last of all: it says that the others are there.
+            # Written last: the record states that all other files exist.
             put_text(out, record.text(), record.name_of(task.shard))
         except OSError as error:
             raise DistributedError(f"{job.out}: cannot be written: {error}", OUTPUT) from error
