@@ -692,13 +692,20 @@ pub(crate) struct Spread {
     pub(crate) item_count: u32,
     pub(crate) first_output: u32,
     pub(crate) lanes_log2: u32,
+    pub(crate) sample_mask: u32,
+    pub(crate) track_mask: u32,
+    pub(crate) step: u32,
+    pub(crate) step_log2: u32,
+    pub(crate) stride: u32,
     pub(crate) line_mask: u32,
+    pub(crate) repetitions: u32,
+    pub(crate) layer_repetitions: u32,
     pub(crate) segments: u32,
     pub(crate) constants: u32,
     pub(crate) outputs: u32,
 }
 
-stored!(Spread, (), 9, detail 0, first_item 1, item_count 2, first_output 3, lanes_log2 4, line_mask 5, segments 6, constants 7, outputs 8);
+stored!(Spread, (), 16, detail 0, first_item 1, item_count 2, first_output 3, lanes_log2 4, sample_mask 5, track_mask 6, step 7, step_log2 8, stride 9, line_mask 10, repetitions 11, layer_repetitions 12, segments 13, constants 14, outputs 15);
 
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct SpreadRun<F> {
@@ -739,6 +746,34 @@ pub(crate) struct TwoKeysHoisted<F> {
 }
 
 stored!(TwoKeysHoisted, (<F>), 1, parameter 0);
+
+/// The angle of the point (along, up), neither of which is negative, from 0 to pi/2; 0 for (0, 0).
+pub(crate) fn acute_arc_tangent<M: Machine>(machine: &M, up: M::F, along: M::F) -> M::F {
+    let _block = machine.block(line!(), 34);
+    let steep = up > along;
+    let large = if steep { up } else { along };
+    let small = if steep { along } else { up };
+    let divisor = if large == M::F::of(0.0) {
+        M::F::of(1.0)
+    } else {
+        large
+    };
+    let inverse = reciprocal(machine, divisor);
+    let near = small * inverse;
+    let t = near + (small - near * divisor) * inverse;
+    let z = t * t;
+    let high =
+        (((M::F::of(ARC_8) * z + M::F::of(ARC_7)) * z + M::F::of(ARC_6)) * z + M::F::of(ARC_5)) * z
+            + M::F::of(ARC_4);
+    let tail = (((high * z + M::F::of(ARC_3)) * z + M::F::of(ARC_2)) * z + M::F::of(ARC_1)) * z
+        + M::F::of(ARC_0);
+    let flat = tail * (z * t) + t;
+    if steep {
+        (M::F::of(HALF_PI) - flat) + M::F::of(HALF_PI_LOW)
+    } else {
+        flat
+    }
+}
 
 pub(crate) fn arc_between<M: Machine>(
     machine: &M,
@@ -786,32 +821,10 @@ pub(crate) fn arc_between<M: Machine>(
 
 /// The angle of the point (x, y), from -pi to pi; 0 for (0, 0).
 pub(crate) fn arc_tangent<M: Machine>(machine: &M, y: M::F, x: M::F) -> M::F {
-    let _block = machine.block(line!(), 43);
-    let up = magnitude(machine, y);
-    let along = magnitude(machine, x);
-    let steep = up > along;
-    let large = if steep { up } else { along };
-    let small = if steep { along } else { up };
-    let divisor = if large == M::F::of(0.0) {
-        M::F::of(1.0)
-    } else {
-        large
-    };
-    let inverse = reciprocal(machine, divisor);
-    let near = small * inverse;
-    let t = near + (small - near * divisor) * inverse;
-    let z = t * t;
-    let high =
-        (((M::F::of(ARC_8) * z + M::F::of(ARC_7)) * z + M::F::of(ARC_6)) * z + M::F::of(ARC_5)) * z
-            + M::F::of(ARC_4);
-    let tail = (((high * z + M::F::of(ARC_3)) * z + M::F::of(ARC_2)) * z + M::F::of(ARC_1)) * z
-        + M::F::of(ARC_0);
-    let flat = tail * (z * t) + t;
-    let acute = if steep {
-        (M::F::of(HALF_PI) - flat) + M::F::of(HALF_PI_LOW)
-    } else {
-        flat
-    };
+    let _block = machine.block(line!(), 10);
+    let result = magnitude(machine, y);
+    let result_2 = magnitude(machine, x);
+    let acute = acute_arc_tangent(machine, result, result_2);
     let obtuse = if x < M::F::of(0.0) {
         (M::F::of(PI) - acute) + M::F::of(PI_LOW)
     } else {
@@ -1105,7 +1118,7 @@ pub(crate) fn constant_of_polynomial_segment<M: Machine>(
 /// A constant of a run, in a repetition.
 pub(crate) fn constant_of_run<M: Machine>(machine: &M, index: u32, repetition: u32) -> [M::F; 4] {
     let _block = machine.block(line!(), 4);
-    let loaded = machine.load::<u32>(Global::Dispatch, 7);
+    let loaded = machine.load::<u32>(Global::Dispatch, 14);
     let result = constant_at(machine, index.wrapping_add(repetition.wrapping_mul(loaded)));
     result
 }
@@ -1607,7 +1620,7 @@ pub(crate) fn entry_at_of_readers_2<M: Machine>(machine: &M, index: u32) -> Crow
 pub(crate) fn euler<M: Machine>(machine: &M, rotation: [M::F; 4], detail: u32) -> [M::F; 3] {
     let mut condition: bool = Default::default();
     let mut condition_2: bool = Default::default();
-    let _block = machine.block(line!(), 71);
+    let _block = machine.block(line!(), 70);
     let symmetric = detail & SYMMETRIC != 0u32;
     let intrinsic = detail & INTRINSIC != 0u32;
     let sign = if detail & NEGATIVE != 0u32 {
@@ -1673,7 +1686,7 @@ pub(crate) fn euler<M: Machine>(machine: &M, rotation: [M::F; 4], detail: u32) -
     }
     let loaded = condition_2;
     let first = if loaded { outer * third_sign } else { outer };
-    let result = arc_tangent(machine, sine, cosine);
+    let result = acute_arc_tangent(machine, sine, cosine);
     let whole = M::F::of(2.0) * result;
     let second = if symmetric {
         whole
@@ -1681,12 +1694,11 @@ pub(crate) fn euler<M: Machine>(machine: &M, rotation: [M::F; 4], detail: u32) -
         (whole - M::F::of(HALF_PI)) - M::F::of(HALF_PI_LOW)
     };
     let result_2 = wrapped(machine, first);
-    let result_3 = wrapped(machine, second);
-    let result_4 = wrapped(machine, inner);
+    let result_3 = wrapped(machine, inner);
     [
         result_2 * M::F::of(DEGREES),
+        second * M::F::of(DEGREES),
         result_3 * M::F::of(DEGREES),
-        result_4 * M::F::of(DEGREES),
     ]
 }
 
@@ -1702,31 +1714,33 @@ pub(crate) fn evaluate_arc_segment<M: Machine>(
     result_2
 }
 
-/// The value at the `j`th sample of a run that needs no care and has no key there. `constant` is its segment's.
+/// The value at a sample of a run that needs no care and has no key there. `at` is the run's `first` for this sample, and
+/// `constant` its segment's.
 pub(crate) fn evaluate_near_arc_segment<M: Machine>(
     machine: &M,
     item: SpreadRun<M::F>,
     segment: ArcSegment<M::F>,
     constant: M::F,
-    j: u32,
+    at: i32,
 ) -> [M::F; 4] {
     let _block = machine.block(line!(), 4);
-    let result = near_distance(machine, item.first, j);
+    let result = near_distance(machine, at);
     let parameter = result * item.scale + item.offset;
     let result_2 = evaluate_with_arc_segment(machine, segment, constant, parameter);
     result_2
 }
 
-/// The value at the `j`th sample of a run that needs no care and has no key there. `constant` is its segment's.
+/// The value at a sample of a run that needs no care and has no key there. `at` is the run's `first` for this sample, and
+/// `constant` its segment's.
 pub(crate) fn evaluate_near_polynomial_segment<M: Machine>(
     machine: &M,
     item: SpreadRun<M::F>,
     segment: PolynomialSegment<M::F>,
     constant: M::F,
-    j: u32,
+    at: i32,
 ) -> [M::F; 4] {
     let _block = machine.block(line!(), 4);
-    let result = near_distance(machine, item.first, j);
+    let result = near_distance(machine, at);
     let parameter = result * item.scale + item.offset;
     let result_2 = evaluate_with_polynomial_segment(machine, segment, constant, parameter);
     result_2
@@ -2528,13 +2542,14 @@ pub(crate) fn location_of<M: Machine>(
     item: SpreadRun<M::F>,
     repetition: u32,
 ) -> [u32; 3] {
-    let _block = machine.block(line!(), 7);
-    let loaded = machine.load::<u32>(Global::Dispatch, 6);
-    let loaded_2 = machine.load::<u32>(Global::Dispatch, 8);
-    let loaded_3 = machine.load::<u32>(Global::Dispatch, 7);
-    let steps = [loaded, loaded_2, loaded_3];
-    let loaded_4 = machine.load::<u32>(Global::Dispatch, 3);
-    let listed = [item.source, item.output.wrapping_add(loaded_4), item.key];
+    let _block = machine.block(line!(), 4);
+    let all = machine.load::<Spread>(Global::Dispatch, 0);
+    let steps = [all.segments, all.outputs, all.constants];
+    let listed = [
+        item.source,
+        item.output.wrapping_add(all.first_output),
+        item.key,
+    ];
     both(
         listed,
         both([repetition; 3], steps, |x, y| x.wrapping_mul(y)),
@@ -2774,88 +2789,102 @@ pub(crate) async fn main_of_coalesced<M: Machine>(machine: &M) {
 
 pub(crate) async fn main_of_alone<M: Machine>(machine: &M) {
     let group = machine.ids().workgroup_id;
-    let groups = machine.ids().num_workgroups;
     let invocation = machine.ids().local_invocation_index;
-    let mut rotation: [M::F; 4] = Default::default();
-    let mut j: u32 = Default::default();
-    let mut pairs: u32 = Default::default();
-    let _block = machine.block(line!(), 38);
-    let lanes_log2 = machine.load::<u32>(Global::Dispatch, 4);
-    let lanes = 1u32 << lanes_log2;
-    let workgroup = group[1].wrapping_mul(groups[0]).wrapping_add(group[0]);
-    let index = workgroup
+    let mut at: i32 = Default::default();
+    let _block = machine.block(line!(), 47);
+    let all = machine.load::<Spread>(Global::Dispatch, 0);
+    let index = group[0]
         .wrapping_mul(SPREAD_WORKGROUP)
         .wrapping_add(invocation)
-        >> lanes_log2;
-    let loaded = machine.load::<u32>(Global::Dispatch, 2);
-    if index >= loaded {
+        >> all.lanes_log2;
+    let repetition = group[2]
+        .wrapping_mul(all.layer_repetitions)
+        .wrapping_add(invocation & all.track_mask);
+    if (index >= all.item_count) | (repetition >= all.repetitions) {
         return;
     }
-    let loaded_2 = machine.load::<u32>(Global::Dispatch, 1);
-    let item = item_at_spread_run(machine, loaded_2.wrapping_add(index));
-    let location = location_of(machine, item, group[2]);
+    let item = item_at_spread_run(machine, all.first_item.wrapping_add(index));
+    let location = location_of(machine, item, repetition);
     let first = location[1];
-    let loaded_3 = machine.load::<u32>(Global::Dispatch, 5);
-    let idle = first & loaded_3;
-    let first_j = (invocation & lanes.wrapping_sub(1u32)).wrapping_sub(idle);
+    let idle = first & all.line_mask;
+    let first_j = (invocation & all.sample_mask).wrapping_sub(idle);
     if item.count >= NEEDS_CARE {
         let _block = machine.block(line!(), 1);
-        store_with_care(machine, item, location, first_j, lanes, group[2]);
+        store_with_care(machine, item, location, first_j, repetition);
         return;
     }
     let count = item.count;
     let segment = segment_at_arc_segment(machine, location[0]);
     let constant = constant_of_arc_segment(machine, segment);
+    let first_at = item.first.wrapping_add(first_j as i32);
     if first_j < count {
-        let _block = machine.block(line!(), 9);
-        let result = evaluate_near_arc_segment(machine, item, segment, constant, first_j);
-        rotation = result;
+        let _block = machine.block(line!(), 4);
         if (first_j == 0u32) & (item.key != NO_KEY) {
             let _block = machine.block(line!(), 2);
-            let result_2 = constant_at(machine, location[2]);
-            rotation = result_2;
+            let result = constant_at(machine, location[2]);
+            store(machine, first, result);
+        } else {
+            let _block = machine.block(line!(), 3);
+            let result_2 = evaluate_near_arc_segment(machine, item, segment, constant, first_at);
+            store(machine, first.wrapping_add(first_j), result_2);
         }
-        let loaded_4 = rotation;
-        store(machine, first.wrapping_add(first_j), loaded_4);
     }
-    j = first_j.wrapping_add(lanes);
-    pairs = (count.wrapping_add(idle) >> lanes_log2).wrapping_add(1u32) >> 1u32;
-    let loaded_5 = pairs;
-    if loaded_5 > 1u32 {
+    let base = first.wrapping_sub((item.first as u32).wrapping_mul(all.stride));
+    let step = all.step as i32;
+    let end = item.first.wrapping_add(count as i32);
+    at = first_at.wrapping_add(step);
+    let full = count.wrapping_add(idle) >> all.step_log2;
+    let loaded = at;
+    let pairs_end =
+        loaded.wrapping_add(((full.wrapping_sub(1u32) & 0xfffffffeu32) << all.step_log2) as i32);
+    let loaded_2 = at;
+    if loaded_2 < pairs_end {
+        let _block = machine.block(line!(), 1);
         loop {
-            let _block = machine.block(line!(), 22);
-            let loaded_6 = j;
-            let loaded_7 = j;
-            let result_3 = evaluate_near_arc_segment(machine, item, segment, constant, loaded_7);
-            store(machine, first.wrapping_add(loaded_6), result_3);
-            let loaded_8 = j;
-            j = loaded_8.wrapping_add(lanes);
-            let loaded_9 = j;
-            let loaded_10 = j;
-            let result_4 = evaluate_near_arc_segment(machine, item, segment, constant, loaded_10);
-            store(machine, first.wrapping_add(loaded_9), result_4);
-            let loaded_11 = j;
-            j = loaded_11.wrapping_add(lanes);
-            let loaded_12 = pairs;
-            pairs = loaded_12.wrapping_sub(1u32);
-            let loaded_13 = pairs;
-            if loaded_13 <= 1u32 {
+            let _block = machine.block(line!(), 23);
+            let loaded_3 = at;
+            let loaded_4 = at;
+            let result_3 = evaluate_near_arc_segment(machine, item, segment, constant, loaded_4);
+            store(
+                machine,
+                base.wrapping_add((loaded_3 as u32).wrapping_mul(all.stride)),
+                result_3,
+            );
+            let loaded_5 = at;
+            at = loaded_5.wrapping_add(step);
+            let loaded_6 = at;
+            let loaded_7 = at;
+            let result_4 = evaluate_near_arc_segment(machine, item, segment, constant, loaded_7);
+            store(
+                machine,
+                base.wrapping_add((loaded_6 as u32).wrapping_mul(all.stride)),
+                result_4,
+            );
+            let loaded_8 = at;
+            at = loaded_8.wrapping_add(step);
+            let loaded_9 = at;
+            if loaded_9 >= pairs_end {
                 break;
             }
         }
+        at = pairs_end;
     }
-    let loaded_14 = j;
-    if loaded_14 < count {
+    let loaded_10 = at;
+    if loaded_10 < end {
         loop {
-            let _block = machine.block(line!(), 11);
-            let loaded_15 = j;
-            let loaded_16 = j;
-            let result_5 = evaluate_near_arc_segment(machine, item, segment, constant, loaded_16);
-            store(machine, first.wrapping_add(loaded_15), result_5);
-            let loaded_17 = j;
-            j = loaded_17.wrapping_add(lanes);
-            let loaded_18 = j;
-            if loaded_18 >= count {
+            let _block = machine.block(line!(), 13);
+            let loaded_11 = at;
+            let loaded_12 = at;
+            let result_5 = evaluate_near_arc_segment(machine, item, segment, constant, loaded_12);
+            store(
+                machine,
+                base.wrapping_add((loaded_11 as u32).wrapping_mul(all.stride)),
+                result_5,
+            );
+            let loaded_13 = at;
+            at = loaded_13.wrapping_add(step);
+            let loaded_14 = at;
+            if loaded_14 >= end {
                 break;
             }
         }
@@ -2867,181 +2896,207 @@ pub(crate) async fn main_of_alone<M: Machine>(machine: &M) {
 
 pub(crate) async fn main_of_together<M: Machine>(machine: &M) {
     let group = machine.ids().workgroup_id;
-    let groups = machine.ids().num_workgroups;
     let invocation = machine.ids().local_invocation_index;
     let mut item: SpreadRun<M::F> = Default::default();
-    let mut begin: u32 = 0u32;
-    let mut end: u32 = Default::default();
+    let mut first_j: u32 = Default::default();
     let mut iteration: u32 = 0u32;
     let mut rotation: [M::F; 4] = Default::default();
-    let mut all: [M::F; 3] = Default::default();
+    let mut all_parts: [M::F; 3] = Default::default();
     let mut part: u32 = Default::default();
     let mut part_2: u32 = Default::default();
+    let mut end_lane: u32 = Default::default();
     let mut part_3: u32 = Default::default();
-    let _block = machine.block(line!(), 41);
-    let loaded = machine.load::<u32>(Global::Dispatch, 4);
-    let lanes = 1u32 << loaded;
-    let workgroup = group[1].wrapping_mul(groups[0]).wrapping_add(group[0]);
-    let loaded_2 = machine.load::<u32>(Global::Dispatch, 4);
-    let first_index = workgroup.wrapping_mul(SPREAD_WORKGROUP >> loaded_2);
-    let loaded_3 = machine.load::<u32>(Global::Dispatch, 2);
-    if first_index >= loaded_3 {
+    let _block = machine.block(line!(), 58);
+    let all = machine.load::<Spread>(Global::Dispatch, 0);
+    let lanes = 1u32 << all.lanes_log2;
+    let first_index = group[0].wrapping_mul(SPREAD_WORKGROUP >> all.lanes_log2);
+    if first_index >= all.item_count {
         return;
     }
-    let loaded_4 = machine.load::<u32>(Global::Dispatch, 1);
-    let result = item_at_spread_run(machine, loaded_4.wrapping_add(first_index));
+    let result = item_at_spread_run(machine, all.first_item.wrapping_add(first_index));
     let iterations = result.iterations;
-    let loaded_5 = machine.load::<u32>(Global::Dispatch, 4);
-    let index = first_index.wrapping_add(invocation >> loaded_5);
-    let loaded_6 = machine.load::<u32>(Global::Dispatch, 2);
-    if index < loaded_6 {
-        let _block = machine.block(line!(), 4);
-        let loaded_7 = machine.load::<u32>(Global::Dispatch, 1);
-        let result_2 = item_at_spread_run(machine, loaded_7.wrapping_add(index));
+    let index = first_index.wrapping_add(invocation >> all.lanes_log2);
+    if index < all.item_count {
+        let _block = machine.block(line!(), 3);
+        let result_2 = item_at_spread_run(machine, all.first_item.wrapping_add(index));
         item = result_2;
     }
-    let loaded_8 = item;
-    let location = location_of(machine, loaded_8, group[2]);
-    let loaded_9 = item.count;
-    let segment = segment_at_arc_segment(
-        machine,
-        if loaded_9 & IS_CONSTANT != 0u32 {
-            0u32
-        } else {
-            location[0]
-        },
-    );
+    let first_repetition = group[2].wrapping_mul(all.layer_repetitions);
+    let repetition = first_repetition.wrapping_add(invocation & all.track_mask);
+    let is_there = repetition < all.repetitions;
+    let loaded = item;
+    let location = location_of(machine, loaded, repetition);
+    let loaded_2 = item.count;
+    let has_segment = is_there & (loaded_2 & IS_CONSTANT == 0u32);
+    let segment = segment_at_arc_segment(machine, if has_segment { location[0] } else { 0u32 });
     let constant = constant_of_arc_segment(machine, segment);
-    let loaded_10 = item;
-    let count = sample_count(machine, loaded_10);
-    let first = location[1];
-    let loaded_11 = machine.load::<u32>(Global::Dispatch, 5);
-    let idle = first & loaded_11;
+    let loaded_3 = item;
+    let count = sample_count(machine, loaded_3);
+    let lane_count = if is_there { count } else { 0u32 };
+    let tracks = all.repetitions.wrapping_sub(first_repetition);
+    let used_lanes = if (all.track_mask != 0u32) & (tracks < lanes) {
+        tracks
+    } else {
+        lanes
+    };
     let lane = invocation & lanes.wrapping_sub(1u32);
+    let run_values = invocation.wrapping_sub(lane).wrapping_mul(3u32);
     let lane_part = (lane & 0xfffffff8u32)
         .wrapping_mul(3u32)
         .wrapping_add(lane & 7u32);
-    let line_lanes = if lanes >= LINE { lanes } else { 0u32 };
-    end = lanes.wrapping_sub(idle);
+    let first = location[1].wrapping_sub((invocation & all.track_mask).wrapping_mul(all.outputs));
+    let first_part = first.wrapping_mul(3u32).wrapping_add(lane_part);
+    let stride = all.stride.wrapping_mul(3u32);
+    let fills_lines = (lanes >= LINE) & (used_lanes == lanes) & (count > all.sample_mask);
+    let filling = if fills_lines {
+        count.wrapping_sub(all.sample_mask)
+    } else {
+        0u32
+    };
+    let sample_lane = invocation & all.sample_mask;
+    first_j = 0u32.wrapping_sub(first & all.line_mask);
     loop {
-        let _block = machine.block(line!(), 30);
-        let loaded_12 = iteration;
-        let values = (loaded_12 & 1u32)
-            .wrapping_mul(SPREAD_WORKGROUP)
-            .wrapping_add(invocation)
-            .wrapping_sub(lane)
-            .wrapping_mul(3u32);
-        let loaded_13 = end;
-        let j = loaded_13.wrapping_sub(lanes).wrapping_add(lane);
-        if j < count {
+        let _block = machine.block(line!(), 20);
+        let loaded_4 = iteration;
+        let values = (loaded_4 & 1u32)
+            .wrapping_mul(0x180u32)
+            .wrapping_add(run_values);
+        let loaded_5 = first_j;
+        let j = loaded_5.wrapping_add(sample_lane);
+        if j < lane_count {
             let _block = machine.block(line!(), 13);
             rotation = <[M::F; 4]>::default();
-            let loaded_14 = item.count;
-            let loaded_15 = item.key;
-            if (loaded_14 < NEEDS_CARE) & ((j != 0u32) | (loaded_15 == NO_KEY)) {
-                let _block = machine.block(line!(), 3);
-                let loaded_16 = item;
-                let result_3 = evaluate_near_arc_segment(machine, loaded_16, segment, constant, j);
+            let loaded_6 = item.count;
+            let loaded_7 = item.key;
+            if (loaded_6 < NEEDS_CARE) & ((j != 0u32) | (loaded_7 == NO_KEY)) {
+                let _block = machine.block(line!(), 6);
+                let loaded_8 = item;
+                let loaded_9 = item.first;
+                let result_3 = evaluate_near_arc_segment(
+                    machine,
+                    loaded_8,
+                    segment,
+                    constant,
+                    loaded_9.wrapping_add(j as i32),
+                );
                 rotation = result_3;
             } else {
                 let _block = machine.block(line!(), 3);
-                let loaded_17 = item;
-                let result_4 = sample_of_arc_segment(machine, loaded_17, segment, j, group[2]);
+                let loaded_10 = item;
+                let result_4 = sample_of_arc_segment(machine, loaded_10, segment, j, repetition);
                 rotation = result_4;
             }
-            let loaded_18 = rotation;
-            let result_5 = parts_1(machine, loaded_18);
-            all = result_5;
+            let loaded_11 = rotation;
+            let result_5 = parts_1(machine, loaded_11);
+            all_parts = result_5;
             part = 0u32;
             loop {
                 let _block = machine.block(line!(), 13);
-                let loaded_19 = part;
-                if !(loaded_19 < 3u32) {
+                let loaded_12 = part;
+                if !(loaded_12 < 3u32) {
                     break;
                 }
-                let loaded_20 = part;
-                let loaded_21 = part;
-                let loaded_22 = all[loaded_21 as usize];
+                let loaded_13 = part;
+                let loaded_14 = part;
+                let loaded_15 = all_parts[loaded_14 as usize];
                 machine.store::<M::F>(
                     Global::Tile,
                     values
                         .wrapping_add(lane.wrapping_mul(3u32))
-                        .wrapping_add(loaded_20) as usize,
-                    loaded_22,
+                        .wrapping_add(loaded_13) as usize,
+                    loaded_15,
                 );
-                let loaded_23 = part;
-                part = loaded_23.wrapping_add(1u32);
+                let loaded_16 = part;
+                part = loaded_16.wrapping_add(1u32);
             }
         }
         barrier().await;
-        let loaded_24 = end;
-        let loaded_25 = begin;
-        let loaded_26 = end;
-        if (loaded_24.wrapping_sub(loaded_25) == line_lanes) & (loaded_26 <= count) {
-            let _block = machine.block(line!(), 6);
+        let loaded_17 = first_j;
+        if loaded_17 < filling {
+            let _block = machine.block(line!(), 5);
             let found = values.wrapping_add(lane_part);
-            let loaded_27 = begin;
-            let stored = first
-                .wrapping_add(loaded_27)
-                .wrapping_mul(3u32)
-                .wrapping_add(lane_part);
+            let loaded_18 = first_j;
+            let stored = first_part.wrapping_add(loaded_18.wrapping_mul(stride));
             part_2 = 0u32;
             loop {
                 let _block = machine.block(line!(), 14);
-                let loaded_28 = part_2;
-                if !(loaded_28 < 3u32) {
+                let loaded_19 = part_2;
+                if !(loaded_19 < 3u32) {
                     break;
                 }
-                let loaded_29 = part_2;
-                let loaded_30 = part_2;
-                let loaded_31 = machine.load::<M::F>(
+                let loaded_20 = part_2;
+                let loaded_21 = part_2;
+                let loaded_22 = machine.load::<M::F>(
                     Global::Tile,
-                    found.wrapping_add(loaded_30.wrapping_mul(LINE)) as usize,
+                    found.wrapping_add(loaded_21.wrapping_mul(LINE)) as usize,
                 );
                 machine.store::<M::F>(
                     Global::Rotations,
-                    stored.wrapping_add(loaded_29.wrapping_mul(LINE)) as usize,
-                    loaded_31,
+                    stored.wrapping_add(loaded_20.wrapping_mul(LINE)) as usize,
+                    loaded_22,
                 );
-                let loaded_32 = part_2;
-                part_2 = loaded_32.wrapping_add(1u32);
+                let loaded_23 = part_2;
+                part_2 = loaded_23.wrapping_add(1u32);
             }
         } else {
-            let _block = machine.block(line!(), 13);
-            let loaded_33 = end;
-            let shift = values.wrapping_add(lanes.wrapping_sub(loaded_33).wrapping_mul(3u32));
-            let loaded_34 = end;
-            let loaded_35 = end;
-            let parts_end = (if count < loaded_35 { count } else { loaded_34 }).wrapping_mul(3u32);
-            let loaded_36 = begin;
-            part_3 = loaded_36.wrapping_mul(3u32).wrapping_add(lane);
+            let _block = machine.block(line!(), 18);
+            let loaded_24 = first_j;
+            let loaded_25 = first_j;
+            let first_lane = if (loaded_25 as i32) < 0i32 {
+                0u32.wrapping_sub(loaded_24)
+            } else {
+                0u32
+            };
+            let loaded_26 = first_j;
+            let last_j = loaded_26.wrapping_add(all.sample_mask);
+            end_lane = used_lanes;
+            if last_j >= count {
+                let _block = machine.block(line!(), 11);
+                let missing = if all.track_mask != 0u32 {
+                    lanes
+                } else {
+                    last_j.wrapping_add(1u32).wrapping_sub(count)
+                };
+                let loaded_27 = end_lane;
+                let loaded_28 = end_lane;
+                let loaded_29 = end_lane;
+                end_lane = loaded_27.wrapping_sub(if missing > loaded_29 {
+                    loaded_28
+                } else {
+                    missing
+                });
+            }
+            let loaded_30 = first_j;
+            let stored_2 = first
+                .wrapping_mul(3u32)
+                .wrapping_add(loaded_30.wrapping_mul(stride));
+            part_3 = first_lane.wrapping_mul(3u32).wrapping_add(lane);
             loop {
-                let _block = machine.block(line!(), 13);
-                let loaded_37 = part_3;
-                if !(loaded_37 < parts_end) {
+                let _block = machine.block(line!(), 14);
+                let loaded_31 = part_3;
+                let loaded_32 = end_lane;
+                if !(loaded_31 < loaded_32.wrapping_mul(3u32)) {
                     break;
                 }
-                let loaded_38 = part_3;
-                let loaded_39 = part_3;
-                let loaded_40 =
-                    machine.load::<M::F>(Global::Tile, shift.wrapping_add(loaded_39) as usize);
+                let loaded_33 = part_3;
+                let loaded_34 = part_3;
+                let loaded_35 =
+                    machine.load::<M::F>(Global::Tile, values.wrapping_add(loaded_34) as usize);
                 machine.store::<M::F>(
                     Global::Rotations,
-                    first.wrapping_mul(3u32).wrapping_add(loaded_38) as usize,
-                    loaded_40,
+                    stored_2.wrapping_add(loaded_33) as usize,
+                    loaded_35,
                 );
-                let loaded_41 = part_3;
-                part_3 = loaded_41.wrapping_add(lanes);
+                let loaded_36 = part_3;
+                part_3 = loaded_36.wrapping_add(lanes);
             }
         }
-        let loaded_42 = end;
-        begin = loaded_42;
-        let loaded_43 = end;
-        end = loaded_43.wrapping_add(lanes);
-        let loaded_44 = iteration;
-        iteration = loaded_44.wrapping_add(1u32);
-        let loaded_45 = iteration;
-        if loaded_45 >= iterations {
+        let loaded_37 = first_j;
+        first_j = loaded_37.wrapping_add(all.step);
+        let loaded_38 = iteration;
+        iteration = loaded_38.wrapping_add(1u32);
+        let loaded_39 = iteration;
+        if loaded_39 >= iterations {
             break;
         }
     }
@@ -3049,181 +3104,207 @@ pub(crate) async fn main_of_together<M: Machine>(machine: &M) {
 
 pub(crate) async fn main_of_together_2<M: Machine>(machine: &M) {
     let group = machine.ids().workgroup_id;
-    let groups = machine.ids().num_workgroups;
     let invocation = machine.ids().local_invocation_index;
     let mut item: SpreadRun<M::F> = Default::default();
-    let mut begin: u32 = 0u32;
-    let mut end: u32 = Default::default();
+    let mut first_j: u32 = Default::default();
     let mut iteration: u32 = 0u32;
     let mut rotation: [M::F; 4] = Default::default();
-    let mut all: [M::F; 9] = Default::default();
+    let mut all_parts: [M::F; 9] = Default::default();
     let mut part: u32 = Default::default();
     let mut part_2: u32 = Default::default();
+    let mut end_lane: u32 = Default::default();
     let mut part_3: u32 = Default::default();
-    let _block = machine.block(line!(), 41);
-    let loaded = machine.load::<u32>(Global::Dispatch, 4);
-    let lanes = 1u32 << loaded;
-    let workgroup = group[1].wrapping_mul(groups[0]).wrapping_add(group[0]);
-    let loaded_2 = machine.load::<u32>(Global::Dispatch, 4);
-    let first_index = workgroup.wrapping_mul(SPREAD_WORKGROUP >> loaded_2);
-    let loaded_3 = machine.load::<u32>(Global::Dispatch, 2);
-    if first_index >= loaded_3 {
+    let _block = machine.block(line!(), 58);
+    let all = machine.load::<Spread>(Global::Dispatch, 0);
+    let lanes = 1u32 << all.lanes_log2;
+    let first_index = group[0].wrapping_mul(SPREAD_WORKGROUP >> all.lanes_log2);
+    if first_index >= all.item_count {
         return;
     }
-    let loaded_4 = machine.load::<u32>(Global::Dispatch, 1);
-    let result = item_at_spread_run(machine, loaded_4.wrapping_add(first_index));
+    let result = item_at_spread_run(machine, all.first_item.wrapping_add(first_index));
     let iterations = result.iterations;
-    let loaded_5 = machine.load::<u32>(Global::Dispatch, 4);
-    let index = first_index.wrapping_add(invocation >> loaded_5);
-    let loaded_6 = machine.load::<u32>(Global::Dispatch, 2);
-    if index < loaded_6 {
-        let _block = machine.block(line!(), 4);
-        let loaded_7 = machine.load::<u32>(Global::Dispatch, 1);
-        let result_2 = item_at_spread_run(machine, loaded_7.wrapping_add(index));
+    let index = first_index.wrapping_add(invocation >> all.lanes_log2);
+    if index < all.item_count {
+        let _block = machine.block(line!(), 3);
+        let result_2 = item_at_spread_run(machine, all.first_item.wrapping_add(index));
         item = result_2;
     }
-    let loaded_8 = item;
-    let location = location_of(machine, loaded_8, group[2]);
-    let loaded_9 = item.count;
-    let segment = segment_at_arc_segment(
-        machine,
-        if loaded_9 & IS_CONSTANT != 0u32 {
-            0u32
-        } else {
-            location[0]
-        },
-    );
+    let first_repetition = group[2].wrapping_mul(all.layer_repetitions);
+    let repetition = first_repetition.wrapping_add(invocation & all.track_mask);
+    let is_there = repetition < all.repetitions;
+    let loaded = item;
+    let location = location_of(machine, loaded, repetition);
+    let loaded_2 = item.count;
+    let has_segment = is_there & (loaded_2 & IS_CONSTANT == 0u32);
+    let segment = segment_at_arc_segment(machine, if has_segment { location[0] } else { 0u32 });
     let constant = constant_of_arc_segment(machine, segment);
-    let loaded_10 = item;
-    let count = sample_count(machine, loaded_10);
-    let first = location[1];
-    let loaded_11 = machine.load::<u32>(Global::Dispatch, 5);
-    let idle = first & loaded_11;
+    let loaded_3 = item;
+    let count = sample_count(machine, loaded_3);
+    let lane_count = if is_there { count } else { 0u32 };
+    let tracks = all.repetitions.wrapping_sub(first_repetition);
+    let used_lanes = if (all.track_mask != 0u32) & (tracks < lanes) {
+        tracks
+    } else {
+        lanes
+    };
     let lane = invocation & lanes.wrapping_sub(1u32);
+    let run_values = invocation.wrapping_sub(lane).wrapping_mul(9u32);
     let lane_part = (lane & 0xfffffff8u32)
         .wrapping_mul(9u32)
         .wrapping_add(lane & 7u32);
-    let line_lanes = if lanes >= LINE { lanes } else { 0u32 };
-    end = lanes.wrapping_sub(idle);
+    let first = location[1].wrapping_sub((invocation & all.track_mask).wrapping_mul(all.outputs));
+    let first_part = first.wrapping_mul(9u32).wrapping_add(lane_part);
+    let stride = all.stride.wrapping_mul(9u32);
+    let fills_lines = (lanes >= LINE) & (used_lanes == lanes) & (count > all.sample_mask);
+    let filling = if fills_lines {
+        count.wrapping_sub(all.sample_mask)
+    } else {
+        0u32
+    };
+    let sample_lane = invocation & all.sample_mask;
+    first_j = 0u32.wrapping_sub(first & all.line_mask);
     loop {
-        let _block = machine.block(line!(), 30);
-        let loaded_12 = iteration;
-        let values = (loaded_12 & 1u32)
-            .wrapping_mul(SPREAD_WORKGROUP)
-            .wrapping_add(invocation)
-            .wrapping_sub(lane)
-            .wrapping_mul(9u32);
-        let loaded_13 = end;
-        let j = loaded_13.wrapping_sub(lanes).wrapping_add(lane);
-        if j < count {
+        let _block = machine.block(line!(), 20);
+        let loaded_4 = iteration;
+        let values = (loaded_4 & 1u32)
+            .wrapping_mul(0x480u32)
+            .wrapping_add(run_values);
+        let loaded_5 = first_j;
+        let j = loaded_5.wrapping_add(sample_lane);
+        if j < lane_count {
             let _block = machine.block(line!(), 13);
             rotation = <[M::F; 4]>::default();
-            let loaded_14 = item.count;
-            let loaded_15 = item.key;
-            if (loaded_14 < NEEDS_CARE) & ((j != 0u32) | (loaded_15 == NO_KEY)) {
-                let _block = machine.block(line!(), 3);
-                let loaded_16 = item;
-                let result_3 = evaluate_near_arc_segment(machine, loaded_16, segment, constant, j);
+            let loaded_6 = item.count;
+            let loaded_7 = item.key;
+            if (loaded_6 < NEEDS_CARE) & ((j != 0u32) | (loaded_7 == NO_KEY)) {
+                let _block = machine.block(line!(), 6);
+                let loaded_8 = item;
+                let loaded_9 = item.first;
+                let result_3 = evaluate_near_arc_segment(
+                    machine,
+                    loaded_8,
+                    segment,
+                    constant,
+                    loaded_9.wrapping_add(j as i32),
+                );
                 rotation = result_3;
             } else {
                 let _block = machine.block(line!(), 3);
-                let loaded_17 = item;
-                let result_4 = sample_of_arc_segment(machine, loaded_17, segment, j, group[2]);
+                let loaded_10 = item;
+                let result_4 = sample_of_arc_segment(machine, loaded_10, segment, j, repetition);
                 rotation = result_4;
             }
-            let loaded_18 = rotation;
-            let result_5 = parts_2(machine, loaded_18);
-            all = result_5;
+            let loaded_11 = rotation;
+            let result_5 = parts_2(machine, loaded_11);
+            all_parts = result_5;
             part = 0u32;
             loop {
                 let _block = machine.block(line!(), 13);
-                let loaded_19 = part;
-                if !(loaded_19 < 9u32) {
+                let loaded_12 = part;
+                if !(loaded_12 < 9u32) {
                     break;
                 }
-                let loaded_20 = part;
-                let loaded_21 = part;
-                let loaded_22 = all[loaded_21 as usize];
+                let loaded_13 = part;
+                let loaded_14 = part;
+                let loaded_15 = all_parts[loaded_14 as usize];
                 machine.store::<M::F>(
                     Global::Tile,
                     values
                         .wrapping_add(lane.wrapping_mul(9u32))
-                        .wrapping_add(loaded_20) as usize,
-                    loaded_22,
+                        .wrapping_add(loaded_13) as usize,
+                    loaded_15,
                 );
-                let loaded_23 = part;
-                part = loaded_23.wrapping_add(1u32);
+                let loaded_16 = part;
+                part = loaded_16.wrapping_add(1u32);
             }
         }
         barrier().await;
-        let loaded_24 = end;
-        let loaded_25 = begin;
-        let loaded_26 = end;
-        if (loaded_24.wrapping_sub(loaded_25) == line_lanes) & (loaded_26 <= count) {
-            let _block = machine.block(line!(), 6);
+        let loaded_17 = first_j;
+        if loaded_17 < filling {
+            let _block = machine.block(line!(), 5);
             let found = values.wrapping_add(lane_part);
-            let loaded_27 = begin;
-            let stored = first
-                .wrapping_add(loaded_27)
-                .wrapping_mul(9u32)
-                .wrapping_add(lane_part);
+            let loaded_18 = first_j;
+            let stored = first_part.wrapping_add(loaded_18.wrapping_mul(stride));
             part_2 = 0u32;
             loop {
                 let _block = machine.block(line!(), 14);
-                let loaded_28 = part_2;
-                if !(loaded_28 < 9u32) {
+                let loaded_19 = part_2;
+                if !(loaded_19 < 9u32) {
                     break;
                 }
-                let loaded_29 = part_2;
-                let loaded_30 = part_2;
-                let loaded_31 = machine.load::<M::F>(
+                let loaded_20 = part_2;
+                let loaded_21 = part_2;
+                let loaded_22 = machine.load::<M::F>(
                     Global::Tile,
-                    found.wrapping_add(loaded_30.wrapping_mul(LINE)) as usize,
+                    found.wrapping_add(loaded_21.wrapping_mul(LINE)) as usize,
                 );
                 machine.store::<M::F>(
                     Global::Rotations,
-                    stored.wrapping_add(loaded_29.wrapping_mul(LINE)) as usize,
-                    loaded_31,
+                    stored.wrapping_add(loaded_20.wrapping_mul(LINE)) as usize,
+                    loaded_22,
                 );
-                let loaded_32 = part_2;
-                part_2 = loaded_32.wrapping_add(1u32);
+                let loaded_23 = part_2;
+                part_2 = loaded_23.wrapping_add(1u32);
             }
         } else {
-            let _block = machine.block(line!(), 13);
-            let loaded_33 = end;
-            let shift = values.wrapping_add(lanes.wrapping_sub(loaded_33).wrapping_mul(9u32));
-            let loaded_34 = end;
-            let loaded_35 = end;
-            let parts_end = (if count < loaded_35 { count } else { loaded_34 }).wrapping_mul(9u32);
-            let loaded_36 = begin;
-            part_3 = loaded_36.wrapping_mul(9u32).wrapping_add(lane);
+            let _block = machine.block(line!(), 18);
+            let loaded_24 = first_j;
+            let loaded_25 = first_j;
+            let first_lane = if (loaded_25 as i32) < 0i32 {
+                0u32.wrapping_sub(loaded_24)
+            } else {
+                0u32
+            };
+            let loaded_26 = first_j;
+            let last_j = loaded_26.wrapping_add(all.sample_mask);
+            end_lane = used_lanes;
+            if last_j >= count {
+                let _block = machine.block(line!(), 11);
+                let missing = if all.track_mask != 0u32 {
+                    lanes
+                } else {
+                    last_j.wrapping_add(1u32).wrapping_sub(count)
+                };
+                let loaded_27 = end_lane;
+                let loaded_28 = end_lane;
+                let loaded_29 = end_lane;
+                end_lane = loaded_27.wrapping_sub(if missing > loaded_29 {
+                    loaded_28
+                } else {
+                    missing
+                });
+            }
+            let loaded_30 = first_j;
+            let stored_2 = first
+                .wrapping_mul(9u32)
+                .wrapping_add(loaded_30.wrapping_mul(stride));
+            part_3 = first_lane.wrapping_mul(9u32).wrapping_add(lane);
             loop {
-                let _block = machine.block(line!(), 13);
-                let loaded_37 = part_3;
-                if !(loaded_37 < parts_end) {
+                let _block = machine.block(line!(), 14);
+                let loaded_31 = part_3;
+                let loaded_32 = end_lane;
+                if !(loaded_31 < loaded_32.wrapping_mul(9u32)) {
                     break;
                 }
-                let loaded_38 = part_3;
-                let loaded_39 = part_3;
-                let loaded_40 =
-                    machine.load::<M::F>(Global::Tile, shift.wrapping_add(loaded_39) as usize);
+                let loaded_33 = part_3;
+                let loaded_34 = part_3;
+                let loaded_35 =
+                    machine.load::<M::F>(Global::Tile, values.wrapping_add(loaded_34) as usize);
                 machine.store::<M::F>(
                     Global::Rotations,
-                    first.wrapping_mul(9u32).wrapping_add(loaded_38) as usize,
-                    loaded_40,
+                    stored_2.wrapping_add(loaded_33) as usize,
+                    loaded_35,
                 );
-                let loaded_41 = part_3;
-                part_3 = loaded_41.wrapping_add(lanes);
+                let loaded_36 = part_3;
+                part_3 = loaded_36.wrapping_add(lanes);
             }
         }
-        let loaded_42 = end;
-        begin = loaded_42;
-        let loaded_43 = end;
-        end = loaded_43.wrapping_add(lanes);
-        let loaded_44 = iteration;
-        iteration = loaded_44.wrapping_add(1u32);
-        let loaded_45 = iteration;
-        if loaded_45 >= iterations {
+        let loaded_37 = first_j;
+        first_j = loaded_37.wrapping_add(all.step);
+        let loaded_38 = iteration;
+        iteration = loaded_38.wrapping_add(1u32);
+        let loaded_39 = iteration;
+        if loaded_39 >= iterations {
             break;
         }
     }
@@ -3231,181 +3312,207 @@ pub(crate) async fn main_of_together_2<M: Machine>(machine: &M) {
 
 pub(crate) async fn main_of_together_3<M: Machine>(machine: &M) {
     let group = machine.ids().workgroup_id;
-    let groups = machine.ids().num_workgroups;
     let invocation = machine.ids().local_invocation_index;
     let mut item: SpreadRun<M::F> = Default::default();
-    let mut begin: u32 = 0u32;
-    let mut end: u32 = Default::default();
+    let mut first_j: u32 = Default::default();
     let mut iteration: u32 = 0u32;
     let mut rotation: [M::F; 4] = Default::default();
-    let mut all: [[M::F; 4]; 3] = Default::default();
+    let mut all_parts: [[M::F; 4]; 3] = Default::default();
     let mut part: u32 = Default::default();
     let mut part_2: u32 = Default::default();
+    let mut end_lane: u32 = Default::default();
     let mut part_3: u32 = Default::default();
-    let _block = machine.block(line!(), 41);
-    let loaded = machine.load::<u32>(Global::Dispatch, 4);
-    let lanes = 1u32 << loaded;
-    let workgroup = group[1].wrapping_mul(groups[0]).wrapping_add(group[0]);
-    let loaded_2 = machine.load::<u32>(Global::Dispatch, 4);
-    let first_index = workgroup.wrapping_mul(SPREAD_WORKGROUP >> loaded_2);
-    let loaded_3 = machine.load::<u32>(Global::Dispatch, 2);
-    if first_index >= loaded_3 {
+    let _block = machine.block(line!(), 58);
+    let all = machine.load::<Spread>(Global::Dispatch, 0);
+    let lanes = 1u32 << all.lanes_log2;
+    let first_index = group[0].wrapping_mul(SPREAD_WORKGROUP >> all.lanes_log2);
+    if first_index >= all.item_count {
         return;
     }
-    let loaded_4 = machine.load::<u32>(Global::Dispatch, 1);
-    let result = item_at_spread_run(machine, loaded_4.wrapping_add(first_index));
+    let result = item_at_spread_run(machine, all.first_item.wrapping_add(first_index));
     let iterations = result.iterations;
-    let loaded_5 = machine.load::<u32>(Global::Dispatch, 4);
-    let index = first_index.wrapping_add(invocation >> loaded_5);
-    let loaded_6 = machine.load::<u32>(Global::Dispatch, 2);
-    if index < loaded_6 {
-        let _block = machine.block(line!(), 4);
-        let loaded_7 = machine.load::<u32>(Global::Dispatch, 1);
-        let result_2 = item_at_spread_run(machine, loaded_7.wrapping_add(index));
+    let index = first_index.wrapping_add(invocation >> all.lanes_log2);
+    if index < all.item_count {
+        let _block = machine.block(line!(), 3);
+        let result_2 = item_at_spread_run(machine, all.first_item.wrapping_add(index));
         item = result_2;
     }
-    let loaded_8 = item;
-    let location = location_of(machine, loaded_8, group[2]);
-    let loaded_9 = item.count;
-    let segment = segment_at_arc_segment(
-        machine,
-        if loaded_9 & IS_CONSTANT != 0u32 {
-            0u32
-        } else {
-            location[0]
-        },
-    );
+    let first_repetition = group[2].wrapping_mul(all.layer_repetitions);
+    let repetition = first_repetition.wrapping_add(invocation & all.track_mask);
+    let is_there = repetition < all.repetitions;
+    let loaded = item;
+    let location = location_of(machine, loaded, repetition);
+    let loaded_2 = item.count;
+    let has_segment = is_there & (loaded_2 & IS_CONSTANT == 0u32);
+    let segment = segment_at_arc_segment(machine, if has_segment { location[0] } else { 0u32 });
     let constant = constant_of_arc_segment(machine, segment);
-    let loaded_10 = item;
-    let count = sample_count(machine, loaded_10);
-    let first = location[1];
-    let loaded_11 = machine.load::<u32>(Global::Dispatch, 5);
-    let idle = first & loaded_11;
+    let loaded_3 = item;
+    let count = sample_count(machine, loaded_3);
+    let lane_count = if is_there { count } else { 0u32 };
+    let tracks = all.repetitions.wrapping_sub(first_repetition);
+    let used_lanes = if (all.track_mask != 0u32) & (tracks < lanes) {
+        tracks
+    } else {
+        lanes
+    };
     let lane = invocation & lanes.wrapping_sub(1u32);
+    let run_values = invocation.wrapping_sub(lane).wrapping_mul(3u32);
     let lane_part = (lane & 0xfffffff8u32)
         .wrapping_mul(3u32)
         .wrapping_add(lane & 7u32);
-    let line_lanes = if lanes >= LINE { lanes } else { 0u32 };
-    end = lanes.wrapping_sub(idle);
+    let first = location[1].wrapping_sub((invocation & all.track_mask).wrapping_mul(all.outputs));
+    let first_part = first.wrapping_mul(3u32).wrapping_add(lane_part);
+    let stride = all.stride.wrapping_mul(3u32);
+    let fills_lines = (lanes >= LINE) & (used_lanes == lanes) & (count > all.sample_mask);
+    let filling = if fills_lines {
+        count.wrapping_sub(all.sample_mask)
+    } else {
+        0u32
+    };
+    let sample_lane = invocation & all.sample_mask;
+    first_j = 0u32.wrapping_sub(first & all.line_mask);
     loop {
-        let _block = machine.block(line!(), 30);
-        let loaded_12 = iteration;
-        let values = (loaded_12 & 1u32)
-            .wrapping_mul(SPREAD_WORKGROUP)
-            .wrapping_add(invocation)
-            .wrapping_sub(lane)
-            .wrapping_mul(3u32);
-        let loaded_13 = end;
-        let j = loaded_13.wrapping_sub(lanes).wrapping_add(lane);
-        if j < count {
+        let _block = machine.block(line!(), 20);
+        let loaded_4 = iteration;
+        let values = (loaded_4 & 1u32)
+            .wrapping_mul(0x180u32)
+            .wrapping_add(run_values);
+        let loaded_5 = first_j;
+        let j = loaded_5.wrapping_add(sample_lane);
+        if j < lane_count {
             let _block = machine.block(line!(), 13);
             rotation = <[M::F; 4]>::default();
-            let loaded_14 = item.count;
-            let loaded_15 = item.key;
-            if (loaded_14 < NEEDS_CARE) & ((j != 0u32) | (loaded_15 == NO_KEY)) {
-                let _block = machine.block(line!(), 3);
-                let loaded_16 = item;
-                let result_3 = evaluate_near_arc_segment(machine, loaded_16, segment, constant, j);
+            let loaded_6 = item.count;
+            let loaded_7 = item.key;
+            if (loaded_6 < NEEDS_CARE) & ((j != 0u32) | (loaded_7 == NO_KEY)) {
+                let _block = machine.block(line!(), 6);
+                let loaded_8 = item;
+                let loaded_9 = item.first;
+                let result_3 = evaluate_near_arc_segment(
+                    machine,
+                    loaded_8,
+                    segment,
+                    constant,
+                    loaded_9.wrapping_add(j as i32),
+                );
                 rotation = result_3;
             } else {
                 let _block = machine.block(line!(), 3);
-                let loaded_17 = item;
-                let result_4 = sample_of_arc_segment(machine, loaded_17, segment, j, group[2]);
+                let loaded_10 = item;
+                let result_4 = sample_of_arc_segment(machine, loaded_10, segment, j, repetition);
                 rotation = result_4;
             }
-            let loaded_18 = rotation;
-            let result_5 = parts_3(machine, loaded_18);
-            all = result_5;
+            let loaded_11 = rotation;
+            let result_5 = parts_3(machine, loaded_11);
+            all_parts = result_5;
             part = 0u32;
             loop {
                 let _block = machine.block(line!(), 13);
-                let loaded_19 = part;
-                if !(loaded_19 < 3u32) {
+                let loaded_12 = part;
+                if !(loaded_12 < 3u32) {
                     break;
                 }
-                let loaded_20 = part;
-                let loaded_21 = part;
-                let loaded_22 = all[loaded_21 as usize];
+                let loaded_13 = part;
+                let loaded_14 = part;
+                let loaded_15 = all_parts[loaded_14 as usize];
                 machine.store::<[M::F; 4]>(
                     Global::Tile,
                     4 * (values
                         .wrapping_add(lane.wrapping_mul(3u32))
-                        .wrapping_add(loaded_20) as usize),
-                    loaded_22,
+                        .wrapping_add(loaded_13) as usize),
+                    loaded_15,
                 );
-                let loaded_23 = part;
-                part = loaded_23.wrapping_add(1u32);
+                let loaded_16 = part;
+                part = loaded_16.wrapping_add(1u32);
             }
         }
         barrier().await;
-        let loaded_24 = end;
-        let loaded_25 = begin;
-        let loaded_26 = end;
-        if (loaded_24.wrapping_sub(loaded_25) == line_lanes) & (loaded_26 <= count) {
-            let _block = machine.block(line!(), 6);
+        let loaded_17 = first_j;
+        if loaded_17 < filling {
+            let _block = machine.block(line!(), 5);
             let found = values.wrapping_add(lane_part);
-            let loaded_27 = begin;
-            let stored = first
-                .wrapping_add(loaded_27)
-                .wrapping_mul(3u32)
-                .wrapping_add(lane_part);
+            let loaded_18 = first_j;
+            let stored = first_part.wrapping_add(loaded_18.wrapping_mul(stride));
             part_2 = 0u32;
             loop {
                 let _block = machine.block(line!(), 14);
-                let loaded_28 = part_2;
-                if !(loaded_28 < 3u32) {
+                let loaded_19 = part_2;
+                if !(loaded_19 < 3u32) {
                     break;
                 }
-                let loaded_29 = part_2;
-                let loaded_30 = part_2;
-                let loaded_31 = machine.load::<[M::F; 4]>(
+                let loaded_20 = part_2;
+                let loaded_21 = part_2;
+                let loaded_22 = machine.load::<[M::F; 4]>(
                     Global::Tile,
-                    4 * (found.wrapping_add(loaded_30.wrapping_mul(LINE)) as usize),
+                    4 * (found.wrapping_add(loaded_21.wrapping_mul(LINE)) as usize),
                 );
                 machine.store::<[M::F; 4]>(
                     Global::Rotations,
-                    4 * (stored.wrapping_add(loaded_29.wrapping_mul(LINE)) as usize),
-                    loaded_31,
+                    4 * (stored.wrapping_add(loaded_20.wrapping_mul(LINE)) as usize),
+                    loaded_22,
                 );
-                let loaded_32 = part_2;
-                part_2 = loaded_32.wrapping_add(1u32);
+                let loaded_23 = part_2;
+                part_2 = loaded_23.wrapping_add(1u32);
             }
         } else {
-            let _block = machine.block(line!(), 13);
-            let loaded_33 = end;
-            let shift = values.wrapping_add(lanes.wrapping_sub(loaded_33).wrapping_mul(3u32));
-            let loaded_34 = end;
-            let loaded_35 = end;
-            let parts_end = (if count < loaded_35 { count } else { loaded_34 }).wrapping_mul(3u32);
-            let loaded_36 = begin;
-            part_3 = loaded_36.wrapping_mul(3u32).wrapping_add(lane);
+            let _block = machine.block(line!(), 18);
+            let loaded_24 = first_j;
+            let loaded_25 = first_j;
+            let first_lane = if (loaded_25 as i32) < 0i32 {
+                0u32.wrapping_sub(loaded_24)
+            } else {
+                0u32
+            };
+            let loaded_26 = first_j;
+            let last_j = loaded_26.wrapping_add(all.sample_mask);
+            end_lane = used_lanes;
+            if last_j >= count {
+                let _block = machine.block(line!(), 11);
+                let missing = if all.track_mask != 0u32 {
+                    lanes
+                } else {
+                    last_j.wrapping_add(1u32).wrapping_sub(count)
+                };
+                let loaded_27 = end_lane;
+                let loaded_28 = end_lane;
+                let loaded_29 = end_lane;
+                end_lane = loaded_27.wrapping_sub(if missing > loaded_29 {
+                    loaded_28
+                } else {
+                    missing
+                });
+            }
+            let loaded_30 = first_j;
+            let stored_2 = first
+                .wrapping_mul(3u32)
+                .wrapping_add(loaded_30.wrapping_mul(stride));
+            part_3 = first_lane.wrapping_mul(3u32).wrapping_add(lane);
             loop {
-                let _block = machine.block(line!(), 13);
-                let loaded_37 = part_3;
-                if !(loaded_37 < parts_end) {
+                let _block = machine.block(line!(), 14);
+                let loaded_31 = part_3;
+                let loaded_32 = end_lane;
+                if !(loaded_31 < loaded_32.wrapping_mul(3u32)) {
                     break;
                 }
-                let loaded_38 = part_3;
-                let loaded_39 = part_3;
-                let loaded_40 = machine
-                    .load::<[M::F; 4]>(Global::Tile, 4 * (shift.wrapping_add(loaded_39) as usize));
+                let loaded_33 = part_3;
+                let loaded_34 = part_3;
+                let loaded_35 = machine
+                    .load::<[M::F; 4]>(Global::Tile, 4 * (values.wrapping_add(loaded_34) as usize));
                 machine.store::<[M::F; 4]>(
                     Global::Rotations,
-                    4 * (first.wrapping_mul(3u32).wrapping_add(loaded_38) as usize),
-                    loaded_40,
+                    4 * (stored_2.wrapping_add(loaded_33) as usize),
+                    loaded_35,
                 );
-                let loaded_41 = part_3;
-                part_3 = loaded_41.wrapping_add(lanes);
+                let loaded_36 = part_3;
+                part_3 = loaded_36.wrapping_add(lanes);
             }
         }
-        let loaded_42 = end;
-        begin = loaded_42;
-        let loaded_43 = end;
-        end = loaded_43.wrapping_add(lanes);
-        let loaded_44 = iteration;
-        iteration = loaded_44.wrapping_add(1u32);
-        let loaded_45 = iteration;
-        if loaded_45 >= iterations {
+        let loaded_37 = first_j;
+        first_j = loaded_37.wrapping_add(all.step);
+        let loaded_38 = iteration;
+        iteration = loaded_38.wrapping_add(1u32);
+        let loaded_39 = iteration;
+        if loaded_39 >= iterations {
             break;
         }
     }
@@ -3571,91 +3678,106 @@ pub(crate) async fn main_of_coalesced_2<M: Machine>(machine: &M) {
 
 pub(crate) async fn main_of_alone_2<M: Machine>(machine: &M) {
     let group = machine.ids().workgroup_id;
-    let groups = machine.ids().num_workgroups;
     let invocation = machine.ids().local_invocation_index;
-    let mut rotation: [M::F; 4] = Default::default();
-    let mut j: u32 = Default::default();
-    let mut pairs: u32 = Default::default();
-    let _block = machine.block(line!(), 38);
-    let lanes_log2 = machine.load::<u32>(Global::Dispatch, 4);
-    let lanes = 1u32 << lanes_log2;
-    let workgroup = group[1].wrapping_mul(groups[0]).wrapping_add(group[0]);
-    let index = workgroup
+    let mut at: i32 = Default::default();
+    let _block = machine.block(line!(), 47);
+    let all = machine.load::<Spread>(Global::Dispatch, 0);
+    let index = group[0]
         .wrapping_mul(SPREAD_WORKGROUP)
         .wrapping_add(invocation)
-        >> lanes_log2;
-    let loaded = machine.load::<u32>(Global::Dispatch, 2);
-    if index >= loaded {
+        >> all.lanes_log2;
+    let repetition = group[2]
+        .wrapping_mul(all.layer_repetitions)
+        .wrapping_add(invocation & all.track_mask);
+    if (index >= all.item_count) | (repetition >= all.repetitions) {
         return;
     }
-    let loaded_2 = machine.load::<u32>(Global::Dispatch, 1);
-    let item = item_at_spread_run(machine, loaded_2.wrapping_add(index));
-    let location = location_of(machine, item, group[2]);
+    let item = item_at_spread_run(machine, all.first_item.wrapping_add(index));
+    let location = location_of(machine, item, repetition);
     let first = location[1];
-    let loaded_3 = machine.load::<u32>(Global::Dispatch, 5);
-    let idle = first & loaded_3;
-    let first_j = (invocation & lanes.wrapping_sub(1u32)).wrapping_sub(idle);
+    let idle = first & all.line_mask;
+    let first_j = (invocation & all.sample_mask).wrapping_sub(idle);
     if item.count >= NEEDS_CARE {
         let _block = machine.block(line!(), 1);
-        store_with_care(machine, item, location, first_j, lanes, group[2]);
+        store_with_care(machine, item, location, first_j, repetition);
         return;
     }
     let count = item.count;
     let segment = segment_at_polynomial_segment(machine, location[0]);
     let constant = constant_of_polynomial_segment(machine, segment);
+    let first_at = item.first.wrapping_add(first_j as i32);
     if first_j < count {
-        let _block = machine.block(line!(), 9);
-        let result = evaluate_near_polynomial_segment(machine, item, segment, constant, first_j);
-        rotation = result;
+        let _block = machine.block(line!(), 4);
         if (first_j == 0u32) & (item.key != NO_KEY) {
             let _block = machine.block(line!(), 2);
-            let result_2 = constant_at(machine, location[2]);
-            rotation = result_2;
+            let result = constant_at(machine, location[2]);
+            store(machine, first, result);
+        } else {
+            let _block = machine.block(line!(), 3);
+            let result_2 =
+                evaluate_near_polynomial_segment(machine, item, segment, constant, first_at);
+            store(machine, first.wrapping_add(first_j), result_2);
         }
-        let loaded_4 = rotation;
-        store(machine, first.wrapping_add(first_j), loaded_4);
     }
-    j = first_j.wrapping_add(lanes);
-    pairs = (count.wrapping_add(idle) >> lanes_log2).wrapping_add(1u32) >> 1u32;
-    let loaded_5 = pairs;
-    if loaded_5 > 1u32 {
+    let base = first.wrapping_sub((item.first as u32).wrapping_mul(all.stride));
+    let step = all.step as i32;
+    let end = item.first.wrapping_add(count as i32);
+    at = first_at.wrapping_add(step);
+    let full = count.wrapping_add(idle) >> all.step_log2;
+    let loaded = at;
+    let pairs_end =
+        loaded.wrapping_add(((full.wrapping_sub(1u32) & 0xfffffffeu32) << all.step_log2) as i32);
+    let loaded_2 = at;
+    if loaded_2 < pairs_end {
+        let _block = machine.block(line!(), 1);
         loop {
-            let _block = machine.block(line!(), 22);
-            let loaded_6 = j;
-            let loaded_7 = j;
+            let _block = machine.block(line!(), 23);
+            let loaded_3 = at;
+            let loaded_4 = at;
             let result_3 =
-                evaluate_near_polynomial_segment(machine, item, segment, constant, loaded_7);
-            store(machine, first.wrapping_add(loaded_6), result_3);
-            let loaded_8 = j;
-            j = loaded_8.wrapping_add(lanes);
-            let loaded_9 = j;
-            let loaded_10 = j;
+                evaluate_near_polynomial_segment(machine, item, segment, constant, loaded_4);
+            store(
+                machine,
+                base.wrapping_add((loaded_3 as u32).wrapping_mul(all.stride)),
+                result_3,
+            );
+            let loaded_5 = at;
+            at = loaded_5.wrapping_add(step);
+            let loaded_6 = at;
+            let loaded_7 = at;
             let result_4 =
-                evaluate_near_polynomial_segment(machine, item, segment, constant, loaded_10);
-            store(machine, first.wrapping_add(loaded_9), result_4);
-            let loaded_11 = j;
-            j = loaded_11.wrapping_add(lanes);
-            let loaded_12 = pairs;
-            pairs = loaded_12.wrapping_sub(1u32);
-            let loaded_13 = pairs;
-            if loaded_13 <= 1u32 {
+                evaluate_near_polynomial_segment(machine, item, segment, constant, loaded_7);
+            store(
+                machine,
+                base.wrapping_add((loaded_6 as u32).wrapping_mul(all.stride)),
+                result_4,
+            );
+            let loaded_8 = at;
+            at = loaded_8.wrapping_add(step);
+            let loaded_9 = at;
+            if loaded_9 >= pairs_end {
                 break;
             }
         }
+        at = pairs_end;
     }
-    let loaded_14 = j;
-    if loaded_14 < count {
+    let loaded_10 = at;
+    if loaded_10 < end {
         loop {
-            let _block = machine.block(line!(), 11);
-            let loaded_15 = j;
-            let loaded_16 = j;
+            let _block = machine.block(line!(), 13);
+            let loaded_11 = at;
+            let loaded_12 = at;
             let result_5 =
-                evaluate_near_polynomial_segment(machine, item, segment, constant, loaded_16);
-            store(machine, first.wrapping_add(loaded_15), result_5);
-            let loaded_17 = j;
-            j = loaded_17.wrapping_add(lanes);
-            let loaded_18 = j;
-            if loaded_18 >= count {
+                evaluate_near_polynomial_segment(machine, item, segment, constant, loaded_12);
+            store(
+                machine,
+                base.wrapping_add((loaded_11 as u32).wrapping_mul(all.stride)),
+                result_5,
+            );
+            let loaded_13 = at;
+            at = loaded_13.wrapping_add(step);
+            let loaded_14 = at;
+            if loaded_14 >= end {
                 break;
             }
         }
@@ -3667,183 +3789,209 @@ pub(crate) async fn main_of_alone_2<M: Machine>(machine: &M) {
 
 pub(crate) async fn main_of_together_4<M: Machine>(machine: &M) {
     let group = machine.ids().workgroup_id;
-    let groups = machine.ids().num_workgroups;
     let invocation = machine.ids().local_invocation_index;
     let mut item: SpreadRun<M::F> = Default::default();
-    let mut begin: u32 = 0u32;
-    let mut end: u32 = Default::default();
+    let mut first_j: u32 = Default::default();
     let mut iteration: u32 = 0u32;
     let mut rotation: [M::F; 4] = Default::default();
-    let mut all: [M::F; 3] = Default::default();
+    let mut all_parts: [M::F; 3] = Default::default();
     let mut part: u32 = Default::default();
     let mut part_2: u32 = Default::default();
+    let mut end_lane: u32 = Default::default();
     let mut part_3: u32 = Default::default();
-    let _block = machine.block(line!(), 41);
-    let loaded = machine.load::<u32>(Global::Dispatch, 4);
-    let lanes = 1u32 << loaded;
-    let workgroup = group[1].wrapping_mul(groups[0]).wrapping_add(group[0]);
-    let loaded_2 = machine.load::<u32>(Global::Dispatch, 4);
-    let first_index = workgroup.wrapping_mul(SPREAD_WORKGROUP >> loaded_2);
-    let loaded_3 = machine.load::<u32>(Global::Dispatch, 2);
-    if first_index >= loaded_3 {
+    let _block = machine.block(line!(), 58);
+    let all = machine.load::<Spread>(Global::Dispatch, 0);
+    let lanes = 1u32 << all.lanes_log2;
+    let first_index = group[0].wrapping_mul(SPREAD_WORKGROUP >> all.lanes_log2);
+    if first_index >= all.item_count {
         return;
     }
-    let loaded_4 = machine.load::<u32>(Global::Dispatch, 1);
-    let result = item_at_spread_run(machine, loaded_4.wrapping_add(first_index));
+    let result = item_at_spread_run(machine, all.first_item.wrapping_add(first_index));
     let iterations = result.iterations;
-    let loaded_5 = machine.load::<u32>(Global::Dispatch, 4);
-    let index = first_index.wrapping_add(invocation >> loaded_5);
-    let loaded_6 = machine.load::<u32>(Global::Dispatch, 2);
-    if index < loaded_6 {
-        let _block = machine.block(line!(), 4);
-        let loaded_7 = machine.load::<u32>(Global::Dispatch, 1);
-        let result_2 = item_at_spread_run(machine, loaded_7.wrapping_add(index));
+    let index = first_index.wrapping_add(invocation >> all.lanes_log2);
+    if index < all.item_count {
+        let _block = machine.block(line!(), 3);
+        let result_2 = item_at_spread_run(machine, all.first_item.wrapping_add(index));
         item = result_2;
     }
-    let loaded_8 = item;
-    let location = location_of(machine, loaded_8, group[2]);
-    let loaded_9 = item.count;
-    let segment = segment_at_polynomial_segment(
-        machine,
-        if loaded_9 & IS_CONSTANT != 0u32 {
-            0u32
-        } else {
-            location[0]
-        },
-    );
+    let first_repetition = group[2].wrapping_mul(all.layer_repetitions);
+    let repetition = first_repetition.wrapping_add(invocation & all.track_mask);
+    let is_there = repetition < all.repetitions;
+    let loaded = item;
+    let location = location_of(machine, loaded, repetition);
+    let loaded_2 = item.count;
+    let has_segment = is_there & (loaded_2 & IS_CONSTANT == 0u32);
+    let segment =
+        segment_at_polynomial_segment(machine, if has_segment { location[0] } else { 0u32 });
     let constant = constant_of_polynomial_segment(machine, segment);
-    let loaded_10 = item;
-    let count = sample_count(machine, loaded_10);
-    let first = location[1];
-    let loaded_11 = machine.load::<u32>(Global::Dispatch, 5);
-    let idle = first & loaded_11;
+    let loaded_3 = item;
+    let count = sample_count(machine, loaded_3);
+    let lane_count = if is_there { count } else { 0u32 };
+    let tracks = all.repetitions.wrapping_sub(first_repetition);
+    let used_lanes = if (all.track_mask != 0u32) & (tracks < lanes) {
+        tracks
+    } else {
+        lanes
+    };
     let lane = invocation & lanes.wrapping_sub(1u32);
+    let run_values = invocation.wrapping_sub(lane).wrapping_mul(3u32);
     let lane_part = (lane & 0xfffffff8u32)
         .wrapping_mul(3u32)
         .wrapping_add(lane & 7u32);
-    let line_lanes = if lanes >= LINE { lanes } else { 0u32 };
-    end = lanes.wrapping_sub(idle);
+    let first = location[1].wrapping_sub((invocation & all.track_mask).wrapping_mul(all.outputs));
+    let first_part = first.wrapping_mul(3u32).wrapping_add(lane_part);
+    let stride = all.stride.wrapping_mul(3u32);
+    let fills_lines = (lanes >= LINE) & (used_lanes == lanes) & (count > all.sample_mask);
+    let filling = if fills_lines {
+        count.wrapping_sub(all.sample_mask)
+    } else {
+        0u32
+    };
+    let sample_lane = invocation & all.sample_mask;
+    first_j = 0u32.wrapping_sub(first & all.line_mask);
     loop {
-        let _block = machine.block(line!(), 30);
-        let loaded_12 = iteration;
-        let values = (loaded_12 & 1u32)
-            .wrapping_mul(SPREAD_WORKGROUP)
-            .wrapping_add(invocation)
-            .wrapping_sub(lane)
-            .wrapping_mul(3u32);
-        let loaded_13 = end;
-        let j = loaded_13.wrapping_sub(lanes).wrapping_add(lane);
-        if j < count {
+        let _block = machine.block(line!(), 20);
+        let loaded_4 = iteration;
+        let values = (loaded_4 & 1u32)
+            .wrapping_mul(0x180u32)
+            .wrapping_add(run_values);
+        let loaded_5 = first_j;
+        let j = loaded_5.wrapping_add(sample_lane);
+        if j < lane_count {
             let _block = machine.block(line!(), 13);
             rotation = <[M::F; 4]>::default();
-            let loaded_14 = item.count;
-            let loaded_15 = item.key;
-            if (loaded_14 < NEEDS_CARE) & ((j != 0u32) | (loaded_15 == NO_KEY)) {
-                let _block = machine.block(line!(), 3);
-                let loaded_16 = item;
-                let result_3 =
-                    evaluate_near_polynomial_segment(machine, loaded_16, segment, constant, j);
+            let loaded_6 = item.count;
+            let loaded_7 = item.key;
+            if (loaded_6 < NEEDS_CARE) & ((j != 0u32) | (loaded_7 == NO_KEY)) {
+                let _block = machine.block(line!(), 6);
+                let loaded_8 = item;
+                let loaded_9 = item.first;
+                let result_3 = evaluate_near_polynomial_segment(
+                    machine,
+                    loaded_8,
+                    segment,
+                    constant,
+                    loaded_9.wrapping_add(j as i32),
+                );
                 rotation = result_3;
             } else {
                 let _block = machine.block(line!(), 3);
-                let loaded_17 = item;
+                let loaded_10 = item;
                 let result_4 =
-                    sample_of_polynomial_segment(machine, loaded_17, segment, j, group[2]);
+                    sample_of_polynomial_segment(machine, loaded_10, segment, j, repetition);
                 rotation = result_4;
             }
-            let loaded_18 = rotation;
-            let result_5 = parts_1(machine, loaded_18);
-            all = result_5;
+            let loaded_11 = rotation;
+            let result_5 = parts_1(machine, loaded_11);
+            all_parts = result_5;
             part = 0u32;
             loop {
                 let _block = machine.block(line!(), 13);
-                let loaded_19 = part;
-                if !(loaded_19 < 3u32) {
+                let loaded_12 = part;
+                if !(loaded_12 < 3u32) {
                     break;
                 }
-                let loaded_20 = part;
-                let loaded_21 = part;
-                let loaded_22 = all[loaded_21 as usize];
+                let loaded_13 = part;
+                let loaded_14 = part;
+                let loaded_15 = all_parts[loaded_14 as usize];
                 machine.store::<M::F>(
                     Global::Tile,
                     values
                         .wrapping_add(lane.wrapping_mul(3u32))
-                        .wrapping_add(loaded_20) as usize,
-                    loaded_22,
+                        .wrapping_add(loaded_13) as usize,
+                    loaded_15,
                 );
-                let loaded_23 = part;
-                part = loaded_23.wrapping_add(1u32);
+                let loaded_16 = part;
+                part = loaded_16.wrapping_add(1u32);
             }
         }
         barrier().await;
-        let loaded_24 = end;
-        let loaded_25 = begin;
-        let loaded_26 = end;
-        if (loaded_24.wrapping_sub(loaded_25) == line_lanes) & (loaded_26 <= count) {
-            let _block = machine.block(line!(), 6);
+        let loaded_17 = first_j;
+        if loaded_17 < filling {
+            let _block = machine.block(line!(), 5);
             let found = values.wrapping_add(lane_part);
-            let loaded_27 = begin;
-            let stored = first
-                .wrapping_add(loaded_27)
-                .wrapping_mul(3u32)
-                .wrapping_add(lane_part);
+            let loaded_18 = first_j;
+            let stored = first_part.wrapping_add(loaded_18.wrapping_mul(stride));
             part_2 = 0u32;
             loop {
                 let _block = machine.block(line!(), 14);
-                let loaded_28 = part_2;
-                if !(loaded_28 < 3u32) {
+                let loaded_19 = part_2;
+                if !(loaded_19 < 3u32) {
                     break;
                 }
-                let loaded_29 = part_2;
-                let loaded_30 = part_2;
-                let loaded_31 = machine.load::<M::F>(
+                let loaded_20 = part_2;
+                let loaded_21 = part_2;
+                let loaded_22 = machine.load::<M::F>(
                     Global::Tile,
-                    found.wrapping_add(loaded_30.wrapping_mul(LINE)) as usize,
+                    found.wrapping_add(loaded_21.wrapping_mul(LINE)) as usize,
                 );
                 machine.store::<M::F>(
                     Global::Rotations,
-                    stored.wrapping_add(loaded_29.wrapping_mul(LINE)) as usize,
-                    loaded_31,
+                    stored.wrapping_add(loaded_20.wrapping_mul(LINE)) as usize,
+                    loaded_22,
                 );
-                let loaded_32 = part_2;
-                part_2 = loaded_32.wrapping_add(1u32);
+                let loaded_23 = part_2;
+                part_2 = loaded_23.wrapping_add(1u32);
             }
         } else {
-            let _block = machine.block(line!(), 13);
-            let loaded_33 = end;
-            let shift = values.wrapping_add(lanes.wrapping_sub(loaded_33).wrapping_mul(3u32));
-            let loaded_34 = end;
-            let loaded_35 = end;
-            let parts_end = (if count < loaded_35 { count } else { loaded_34 }).wrapping_mul(3u32);
-            let loaded_36 = begin;
-            part_3 = loaded_36.wrapping_mul(3u32).wrapping_add(lane);
+            let _block = machine.block(line!(), 18);
+            let loaded_24 = first_j;
+            let loaded_25 = first_j;
+            let first_lane = if (loaded_25 as i32) < 0i32 {
+                0u32.wrapping_sub(loaded_24)
+            } else {
+                0u32
+            };
+            let loaded_26 = first_j;
+            let last_j = loaded_26.wrapping_add(all.sample_mask);
+            end_lane = used_lanes;
+            if last_j >= count {
+                let _block = machine.block(line!(), 11);
+                let missing = if all.track_mask != 0u32 {
+                    lanes
+                } else {
+                    last_j.wrapping_add(1u32).wrapping_sub(count)
+                };
+                let loaded_27 = end_lane;
+                let loaded_28 = end_lane;
+                let loaded_29 = end_lane;
+                end_lane = loaded_27.wrapping_sub(if missing > loaded_29 {
+                    loaded_28
+                } else {
+                    missing
+                });
+            }
+            let loaded_30 = first_j;
+            let stored_2 = first
+                .wrapping_mul(3u32)
+                .wrapping_add(loaded_30.wrapping_mul(stride));
+            part_3 = first_lane.wrapping_mul(3u32).wrapping_add(lane);
             loop {
-                let _block = machine.block(line!(), 13);
-                let loaded_37 = part_3;
-                if !(loaded_37 < parts_end) {
+                let _block = machine.block(line!(), 14);
+                let loaded_31 = part_3;
+                let loaded_32 = end_lane;
+                if !(loaded_31 < loaded_32.wrapping_mul(3u32)) {
                     break;
                 }
-                let loaded_38 = part_3;
-                let loaded_39 = part_3;
-                let loaded_40 =
-                    machine.load::<M::F>(Global::Tile, shift.wrapping_add(loaded_39) as usize);
+                let loaded_33 = part_3;
+                let loaded_34 = part_3;
+                let loaded_35 =
+                    machine.load::<M::F>(Global::Tile, values.wrapping_add(loaded_34) as usize);
                 machine.store::<M::F>(
                     Global::Rotations,
-                    first.wrapping_mul(3u32).wrapping_add(loaded_38) as usize,
-                    loaded_40,
+                    stored_2.wrapping_add(loaded_33) as usize,
+                    loaded_35,
                 );
-                let loaded_41 = part_3;
-                part_3 = loaded_41.wrapping_add(lanes);
+                let loaded_36 = part_3;
+                part_3 = loaded_36.wrapping_add(lanes);
             }
         }
-        let loaded_42 = end;
-        begin = loaded_42;
-        let loaded_43 = end;
-        end = loaded_43.wrapping_add(lanes);
-        let loaded_44 = iteration;
-        iteration = loaded_44.wrapping_add(1u32);
-        let loaded_45 = iteration;
-        if loaded_45 >= iterations {
+        let loaded_37 = first_j;
+        first_j = loaded_37.wrapping_add(all.step);
+        let loaded_38 = iteration;
+        iteration = loaded_38.wrapping_add(1u32);
+        let loaded_39 = iteration;
+        if loaded_39 >= iterations {
             break;
         }
     }
@@ -3851,183 +3999,209 @@ pub(crate) async fn main_of_together_4<M: Machine>(machine: &M) {
 
 pub(crate) async fn main_of_together_5<M: Machine>(machine: &M) {
     let group = machine.ids().workgroup_id;
-    let groups = machine.ids().num_workgroups;
     let invocation = machine.ids().local_invocation_index;
     let mut item: SpreadRun<M::F> = Default::default();
-    let mut begin: u32 = 0u32;
-    let mut end: u32 = Default::default();
+    let mut first_j: u32 = Default::default();
     let mut iteration: u32 = 0u32;
     let mut rotation: [M::F; 4] = Default::default();
-    let mut all: [M::F; 9] = Default::default();
+    let mut all_parts: [M::F; 9] = Default::default();
     let mut part: u32 = Default::default();
     let mut part_2: u32 = Default::default();
+    let mut end_lane: u32 = Default::default();
     let mut part_3: u32 = Default::default();
-    let _block = machine.block(line!(), 41);
-    let loaded = machine.load::<u32>(Global::Dispatch, 4);
-    let lanes = 1u32 << loaded;
-    let workgroup = group[1].wrapping_mul(groups[0]).wrapping_add(group[0]);
-    let loaded_2 = machine.load::<u32>(Global::Dispatch, 4);
-    let first_index = workgroup.wrapping_mul(SPREAD_WORKGROUP >> loaded_2);
-    let loaded_3 = machine.load::<u32>(Global::Dispatch, 2);
-    if first_index >= loaded_3 {
+    let _block = machine.block(line!(), 58);
+    let all = machine.load::<Spread>(Global::Dispatch, 0);
+    let lanes = 1u32 << all.lanes_log2;
+    let first_index = group[0].wrapping_mul(SPREAD_WORKGROUP >> all.lanes_log2);
+    if first_index >= all.item_count {
         return;
     }
-    let loaded_4 = machine.load::<u32>(Global::Dispatch, 1);
-    let result = item_at_spread_run(machine, loaded_4.wrapping_add(first_index));
+    let result = item_at_spread_run(machine, all.first_item.wrapping_add(first_index));
     let iterations = result.iterations;
-    let loaded_5 = machine.load::<u32>(Global::Dispatch, 4);
-    let index = first_index.wrapping_add(invocation >> loaded_5);
-    let loaded_6 = machine.load::<u32>(Global::Dispatch, 2);
-    if index < loaded_6 {
-        let _block = machine.block(line!(), 4);
-        let loaded_7 = machine.load::<u32>(Global::Dispatch, 1);
-        let result_2 = item_at_spread_run(machine, loaded_7.wrapping_add(index));
+    let index = first_index.wrapping_add(invocation >> all.lanes_log2);
+    if index < all.item_count {
+        let _block = machine.block(line!(), 3);
+        let result_2 = item_at_spread_run(machine, all.first_item.wrapping_add(index));
         item = result_2;
     }
-    let loaded_8 = item;
-    let location = location_of(machine, loaded_8, group[2]);
-    let loaded_9 = item.count;
-    let segment = segment_at_polynomial_segment(
-        machine,
-        if loaded_9 & IS_CONSTANT != 0u32 {
-            0u32
-        } else {
-            location[0]
-        },
-    );
+    let first_repetition = group[2].wrapping_mul(all.layer_repetitions);
+    let repetition = first_repetition.wrapping_add(invocation & all.track_mask);
+    let is_there = repetition < all.repetitions;
+    let loaded = item;
+    let location = location_of(machine, loaded, repetition);
+    let loaded_2 = item.count;
+    let has_segment = is_there & (loaded_2 & IS_CONSTANT == 0u32);
+    let segment =
+        segment_at_polynomial_segment(machine, if has_segment { location[0] } else { 0u32 });
     let constant = constant_of_polynomial_segment(machine, segment);
-    let loaded_10 = item;
-    let count = sample_count(machine, loaded_10);
-    let first = location[1];
-    let loaded_11 = machine.load::<u32>(Global::Dispatch, 5);
-    let idle = first & loaded_11;
+    let loaded_3 = item;
+    let count = sample_count(machine, loaded_3);
+    let lane_count = if is_there { count } else { 0u32 };
+    let tracks = all.repetitions.wrapping_sub(first_repetition);
+    let used_lanes = if (all.track_mask != 0u32) & (tracks < lanes) {
+        tracks
+    } else {
+        lanes
+    };
     let lane = invocation & lanes.wrapping_sub(1u32);
+    let run_values = invocation.wrapping_sub(lane).wrapping_mul(9u32);
     let lane_part = (lane & 0xfffffff8u32)
         .wrapping_mul(9u32)
         .wrapping_add(lane & 7u32);
-    let line_lanes = if lanes >= LINE { lanes } else { 0u32 };
-    end = lanes.wrapping_sub(idle);
+    let first = location[1].wrapping_sub((invocation & all.track_mask).wrapping_mul(all.outputs));
+    let first_part = first.wrapping_mul(9u32).wrapping_add(lane_part);
+    let stride = all.stride.wrapping_mul(9u32);
+    let fills_lines = (lanes >= LINE) & (used_lanes == lanes) & (count > all.sample_mask);
+    let filling = if fills_lines {
+        count.wrapping_sub(all.sample_mask)
+    } else {
+        0u32
+    };
+    let sample_lane = invocation & all.sample_mask;
+    first_j = 0u32.wrapping_sub(first & all.line_mask);
     loop {
-        let _block = machine.block(line!(), 30);
-        let loaded_12 = iteration;
-        let values = (loaded_12 & 1u32)
-            .wrapping_mul(SPREAD_WORKGROUP)
-            .wrapping_add(invocation)
-            .wrapping_sub(lane)
-            .wrapping_mul(9u32);
-        let loaded_13 = end;
-        let j = loaded_13.wrapping_sub(lanes).wrapping_add(lane);
-        if j < count {
+        let _block = machine.block(line!(), 20);
+        let loaded_4 = iteration;
+        let values = (loaded_4 & 1u32)
+            .wrapping_mul(0x480u32)
+            .wrapping_add(run_values);
+        let loaded_5 = first_j;
+        let j = loaded_5.wrapping_add(sample_lane);
+        if j < lane_count {
             let _block = machine.block(line!(), 13);
             rotation = <[M::F; 4]>::default();
-            let loaded_14 = item.count;
-            let loaded_15 = item.key;
-            if (loaded_14 < NEEDS_CARE) & ((j != 0u32) | (loaded_15 == NO_KEY)) {
-                let _block = machine.block(line!(), 3);
-                let loaded_16 = item;
-                let result_3 =
-                    evaluate_near_polynomial_segment(machine, loaded_16, segment, constant, j);
+            let loaded_6 = item.count;
+            let loaded_7 = item.key;
+            if (loaded_6 < NEEDS_CARE) & ((j != 0u32) | (loaded_7 == NO_KEY)) {
+                let _block = machine.block(line!(), 6);
+                let loaded_8 = item;
+                let loaded_9 = item.first;
+                let result_3 = evaluate_near_polynomial_segment(
+                    machine,
+                    loaded_8,
+                    segment,
+                    constant,
+                    loaded_9.wrapping_add(j as i32),
+                );
                 rotation = result_3;
             } else {
                 let _block = machine.block(line!(), 3);
-                let loaded_17 = item;
+                let loaded_10 = item;
                 let result_4 =
-                    sample_of_polynomial_segment(machine, loaded_17, segment, j, group[2]);
+                    sample_of_polynomial_segment(machine, loaded_10, segment, j, repetition);
                 rotation = result_4;
             }
-            let loaded_18 = rotation;
-            let result_5 = parts_2(machine, loaded_18);
-            all = result_5;
+            let loaded_11 = rotation;
+            let result_5 = parts_2(machine, loaded_11);
+            all_parts = result_5;
             part = 0u32;
             loop {
                 let _block = machine.block(line!(), 13);
-                let loaded_19 = part;
-                if !(loaded_19 < 9u32) {
+                let loaded_12 = part;
+                if !(loaded_12 < 9u32) {
                     break;
                 }
-                let loaded_20 = part;
-                let loaded_21 = part;
-                let loaded_22 = all[loaded_21 as usize];
+                let loaded_13 = part;
+                let loaded_14 = part;
+                let loaded_15 = all_parts[loaded_14 as usize];
                 machine.store::<M::F>(
                     Global::Tile,
                     values
                         .wrapping_add(lane.wrapping_mul(9u32))
-                        .wrapping_add(loaded_20) as usize,
-                    loaded_22,
+                        .wrapping_add(loaded_13) as usize,
+                    loaded_15,
                 );
-                let loaded_23 = part;
-                part = loaded_23.wrapping_add(1u32);
+                let loaded_16 = part;
+                part = loaded_16.wrapping_add(1u32);
             }
         }
         barrier().await;
-        let loaded_24 = end;
-        let loaded_25 = begin;
-        let loaded_26 = end;
-        if (loaded_24.wrapping_sub(loaded_25) == line_lanes) & (loaded_26 <= count) {
-            let _block = machine.block(line!(), 6);
+        let loaded_17 = first_j;
+        if loaded_17 < filling {
+            let _block = machine.block(line!(), 5);
             let found = values.wrapping_add(lane_part);
-            let loaded_27 = begin;
-            let stored = first
-                .wrapping_add(loaded_27)
-                .wrapping_mul(9u32)
-                .wrapping_add(lane_part);
+            let loaded_18 = first_j;
+            let stored = first_part.wrapping_add(loaded_18.wrapping_mul(stride));
             part_2 = 0u32;
             loop {
                 let _block = machine.block(line!(), 14);
-                let loaded_28 = part_2;
-                if !(loaded_28 < 9u32) {
+                let loaded_19 = part_2;
+                if !(loaded_19 < 9u32) {
                     break;
                 }
-                let loaded_29 = part_2;
-                let loaded_30 = part_2;
-                let loaded_31 = machine.load::<M::F>(
+                let loaded_20 = part_2;
+                let loaded_21 = part_2;
+                let loaded_22 = machine.load::<M::F>(
                     Global::Tile,
-                    found.wrapping_add(loaded_30.wrapping_mul(LINE)) as usize,
+                    found.wrapping_add(loaded_21.wrapping_mul(LINE)) as usize,
                 );
                 machine.store::<M::F>(
                     Global::Rotations,
-                    stored.wrapping_add(loaded_29.wrapping_mul(LINE)) as usize,
-                    loaded_31,
+                    stored.wrapping_add(loaded_20.wrapping_mul(LINE)) as usize,
+                    loaded_22,
                 );
-                let loaded_32 = part_2;
-                part_2 = loaded_32.wrapping_add(1u32);
+                let loaded_23 = part_2;
+                part_2 = loaded_23.wrapping_add(1u32);
             }
         } else {
-            let _block = machine.block(line!(), 13);
-            let loaded_33 = end;
-            let shift = values.wrapping_add(lanes.wrapping_sub(loaded_33).wrapping_mul(9u32));
-            let loaded_34 = end;
-            let loaded_35 = end;
-            let parts_end = (if count < loaded_35 { count } else { loaded_34 }).wrapping_mul(9u32);
-            let loaded_36 = begin;
-            part_3 = loaded_36.wrapping_mul(9u32).wrapping_add(lane);
+            let _block = machine.block(line!(), 18);
+            let loaded_24 = first_j;
+            let loaded_25 = first_j;
+            let first_lane = if (loaded_25 as i32) < 0i32 {
+                0u32.wrapping_sub(loaded_24)
+            } else {
+                0u32
+            };
+            let loaded_26 = first_j;
+            let last_j = loaded_26.wrapping_add(all.sample_mask);
+            end_lane = used_lanes;
+            if last_j >= count {
+                let _block = machine.block(line!(), 11);
+                let missing = if all.track_mask != 0u32 {
+                    lanes
+                } else {
+                    last_j.wrapping_add(1u32).wrapping_sub(count)
+                };
+                let loaded_27 = end_lane;
+                let loaded_28 = end_lane;
+                let loaded_29 = end_lane;
+                end_lane = loaded_27.wrapping_sub(if missing > loaded_29 {
+                    loaded_28
+                } else {
+                    missing
+                });
+            }
+            let loaded_30 = first_j;
+            let stored_2 = first
+                .wrapping_mul(9u32)
+                .wrapping_add(loaded_30.wrapping_mul(stride));
+            part_3 = first_lane.wrapping_mul(9u32).wrapping_add(lane);
             loop {
-                let _block = machine.block(line!(), 13);
-                let loaded_37 = part_3;
-                if !(loaded_37 < parts_end) {
+                let _block = machine.block(line!(), 14);
+                let loaded_31 = part_3;
+                let loaded_32 = end_lane;
+                if !(loaded_31 < loaded_32.wrapping_mul(9u32)) {
                     break;
                 }
-                let loaded_38 = part_3;
-                let loaded_39 = part_3;
-                let loaded_40 =
-                    machine.load::<M::F>(Global::Tile, shift.wrapping_add(loaded_39) as usize);
+                let loaded_33 = part_3;
+                let loaded_34 = part_3;
+                let loaded_35 =
+                    machine.load::<M::F>(Global::Tile, values.wrapping_add(loaded_34) as usize);
                 machine.store::<M::F>(
                     Global::Rotations,
-                    first.wrapping_mul(9u32).wrapping_add(loaded_38) as usize,
-                    loaded_40,
+                    stored_2.wrapping_add(loaded_33) as usize,
+                    loaded_35,
                 );
-                let loaded_41 = part_3;
-                part_3 = loaded_41.wrapping_add(lanes);
+                let loaded_36 = part_3;
+                part_3 = loaded_36.wrapping_add(lanes);
             }
         }
-        let loaded_42 = end;
-        begin = loaded_42;
-        let loaded_43 = end;
-        end = loaded_43.wrapping_add(lanes);
-        let loaded_44 = iteration;
-        iteration = loaded_44.wrapping_add(1u32);
-        let loaded_45 = iteration;
-        if loaded_45 >= iterations {
+        let loaded_37 = first_j;
+        first_j = loaded_37.wrapping_add(all.step);
+        let loaded_38 = iteration;
+        iteration = loaded_38.wrapping_add(1u32);
+        let loaded_39 = iteration;
+        if loaded_39 >= iterations {
             break;
         }
     }
@@ -4035,183 +4209,209 @@ pub(crate) async fn main_of_together_5<M: Machine>(machine: &M) {
 
 pub(crate) async fn main_of_together_6<M: Machine>(machine: &M) {
     let group = machine.ids().workgroup_id;
-    let groups = machine.ids().num_workgroups;
     let invocation = machine.ids().local_invocation_index;
     let mut item: SpreadRun<M::F> = Default::default();
-    let mut begin: u32 = 0u32;
-    let mut end: u32 = Default::default();
+    let mut first_j: u32 = Default::default();
     let mut iteration: u32 = 0u32;
     let mut rotation: [M::F; 4] = Default::default();
-    let mut all: [[M::F; 4]; 3] = Default::default();
+    let mut all_parts: [[M::F; 4]; 3] = Default::default();
     let mut part: u32 = Default::default();
     let mut part_2: u32 = Default::default();
+    let mut end_lane: u32 = Default::default();
     let mut part_3: u32 = Default::default();
-    let _block = machine.block(line!(), 41);
-    let loaded = machine.load::<u32>(Global::Dispatch, 4);
-    let lanes = 1u32 << loaded;
-    let workgroup = group[1].wrapping_mul(groups[0]).wrapping_add(group[0]);
-    let loaded_2 = machine.load::<u32>(Global::Dispatch, 4);
-    let first_index = workgroup.wrapping_mul(SPREAD_WORKGROUP >> loaded_2);
-    let loaded_3 = machine.load::<u32>(Global::Dispatch, 2);
-    if first_index >= loaded_3 {
+    let _block = machine.block(line!(), 58);
+    let all = machine.load::<Spread>(Global::Dispatch, 0);
+    let lanes = 1u32 << all.lanes_log2;
+    let first_index = group[0].wrapping_mul(SPREAD_WORKGROUP >> all.lanes_log2);
+    if first_index >= all.item_count {
         return;
     }
-    let loaded_4 = machine.load::<u32>(Global::Dispatch, 1);
-    let result = item_at_spread_run(machine, loaded_4.wrapping_add(first_index));
+    let result = item_at_spread_run(machine, all.first_item.wrapping_add(first_index));
     let iterations = result.iterations;
-    let loaded_5 = machine.load::<u32>(Global::Dispatch, 4);
-    let index = first_index.wrapping_add(invocation >> loaded_5);
-    let loaded_6 = machine.load::<u32>(Global::Dispatch, 2);
-    if index < loaded_6 {
-        let _block = machine.block(line!(), 4);
-        let loaded_7 = machine.load::<u32>(Global::Dispatch, 1);
-        let result_2 = item_at_spread_run(machine, loaded_7.wrapping_add(index));
+    let index = first_index.wrapping_add(invocation >> all.lanes_log2);
+    if index < all.item_count {
+        let _block = machine.block(line!(), 3);
+        let result_2 = item_at_spread_run(machine, all.first_item.wrapping_add(index));
         item = result_2;
     }
-    let loaded_8 = item;
-    let location = location_of(machine, loaded_8, group[2]);
-    let loaded_9 = item.count;
-    let segment = segment_at_polynomial_segment(
-        machine,
-        if loaded_9 & IS_CONSTANT != 0u32 {
-            0u32
-        } else {
-            location[0]
-        },
-    );
+    let first_repetition = group[2].wrapping_mul(all.layer_repetitions);
+    let repetition = first_repetition.wrapping_add(invocation & all.track_mask);
+    let is_there = repetition < all.repetitions;
+    let loaded = item;
+    let location = location_of(machine, loaded, repetition);
+    let loaded_2 = item.count;
+    let has_segment = is_there & (loaded_2 & IS_CONSTANT == 0u32);
+    let segment =
+        segment_at_polynomial_segment(machine, if has_segment { location[0] } else { 0u32 });
     let constant = constant_of_polynomial_segment(machine, segment);
-    let loaded_10 = item;
-    let count = sample_count(machine, loaded_10);
-    let first = location[1];
-    let loaded_11 = machine.load::<u32>(Global::Dispatch, 5);
-    let idle = first & loaded_11;
+    let loaded_3 = item;
+    let count = sample_count(machine, loaded_3);
+    let lane_count = if is_there { count } else { 0u32 };
+    let tracks = all.repetitions.wrapping_sub(first_repetition);
+    let used_lanes = if (all.track_mask != 0u32) & (tracks < lanes) {
+        tracks
+    } else {
+        lanes
+    };
     let lane = invocation & lanes.wrapping_sub(1u32);
+    let run_values = invocation.wrapping_sub(lane).wrapping_mul(3u32);
     let lane_part = (lane & 0xfffffff8u32)
         .wrapping_mul(3u32)
         .wrapping_add(lane & 7u32);
-    let line_lanes = if lanes >= LINE { lanes } else { 0u32 };
-    end = lanes.wrapping_sub(idle);
+    let first = location[1].wrapping_sub((invocation & all.track_mask).wrapping_mul(all.outputs));
+    let first_part = first.wrapping_mul(3u32).wrapping_add(lane_part);
+    let stride = all.stride.wrapping_mul(3u32);
+    let fills_lines = (lanes >= LINE) & (used_lanes == lanes) & (count > all.sample_mask);
+    let filling = if fills_lines {
+        count.wrapping_sub(all.sample_mask)
+    } else {
+        0u32
+    };
+    let sample_lane = invocation & all.sample_mask;
+    first_j = 0u32.wrapping_sub(first & all.line_mask);
     loop {
-        let _block = machine.block(line!(), 30);
-        let loaded_12 = iteration;
-        let values = (loaded_12 & 1u32)
-            .wrapping_mul(SPREAD_WORKGROUP)
-            .wrapping_add(invocation)
-            .wrapping_sub(lane)
-            .wrapping_mul(3u32);
-        let loaded_13 = end;
-        let j = loaded_13.wrapping_sub(lanes).wrapping_add(lane);
-        if j < count {
+        let _block = machine.block(line!(), 20);
+        let loaded_4 = iteration;
+        let values = (loaded_4 & 1u32)
+            .wrapping_mul(0x180u32)
+            .wrapping_add(run_values);
+        let loaded_5 = first_j;
+        let j = loaded_5.wrapping_add(sample_lane);
+        if j < lane_count {
             let _block = machine.block(line!(), 13);
             rotation = <[M::F; 4]>::default();
-            let loaded_14 = item.count;
-            let loaded_15 = item.key;
-            if (loaded_14 < NEEDS_CARE) & ((j != 0u32) | (loaded_15 == NO_KEY)) {
-                let _block = machine.block(line!(), 3);
-                let loaded_16 = item;
-                let result_3 =
-                    evaluate_near_polynomial_segment(machine, loaded_16, segment, constant, j);
+            let loaded_6 = item.count;
+            let loaded_7 = item.key;
+            if (loaded_6 < NEEDS_CARE) & ((j != 0u32) | (loaded_7 == NO_KEY)) {
+                let _block = machine.block(line!(), 6);
+                let loaded_8 = item;
+                let loaded_9 = item.first;
+                let result_3 = evaluate_near_polynomial_segment(
+                    machine,
+                    loaded_8,
+                    segment,
+                    constant,
+                    loaded_9.wrapping_add(j as i32),
+                );
                 rotation = result_3;
             } else {
                 let _block = machine.block(line!(), 3);
-                let loaded_17 = item;
+                let loaded_10 = item;
                 let result_4 =
-                    sample_of_polynomial_segment(machine, loaded_17, segment, j, group[2]);
+                    sample_of_polynomial_segment(machine, loaded_10, segment, j, repetition);
                 rotation = result_4;
             }
-            let loaded_18 = rotation;
-            let result_5 = parts_3(machine, loaded_18);
-            all = result_5;
+            let loaded_11 = rotation;
+            let result_5 = parts_3(machine, loaded_11);
+            all_parts = result_5;
             part = 0u32;
             loop {
                 let _block = machine.block(line!(), 13);
-                let loaded_19 = part;
-                if !(loaded_19 < 3u32) {
+                let loaded_12 = part;
+                if !(loaded_12 < 3u32) {
                     break;
                 }
-                let loaded_20 = part;
-                let loaded_21 = part;
-                let loaded_22 = all[loaded_21 as usize];
+                let loaded_13 = part;
+                let loaded_14 = part;
+                let loaded_15 = all_parts[loaded_14 as usize];
                 machine.store::<[M::F; 4]>(
                     Global::Tile,
                     4 * (values
                         .wrapping_add(lane.wrapping_mul(3u32))
-                        .wrapping_add(loaded_20) as usize),
-                    loaded_22,
+                        .wrapping_add(loaded_13) as usize),
+                    loaded_15,
                 );
-                let loaded_23 = part;
-                part = loaded_23.wrapping_add(1u32);
+                let loaded_16 = part;
+                part = loaded_16.wrapping_add(1u32);
             }
         }
         barrier().await;
-        let loaded_24 = end;
-        let loaded_25 = begin;
-        let loaded_26 = end;
-        if (loaded_24.wrapping_sub(loaded_25) == line_lanes) & (loaded_26 <= count) {
-            let _block = machine.block(line!(), 6);
+        let loaded_17 = first_j;
+        if loaded_17 < filling {
+            let _block = machine.block(line!(), 5);
             let found = values.wrapping_add(lane_part);
-            let loaded_27 = begin;
-            let stored = first
-                .wrapping_add(loaded_27)
-                .wrapping_mul(3u32)
-                .wrapping_add(lane_part);
+            let loaded_18 = first_j;
+            let stored = first_part.wrapping_add(loaded_18.wrapping_mul(stride));
             part_2 = 0u32;
             loop {
                 let _block = machine.block(line!(), 14);
-                let loaded_28 = part_2;
-                if !(loaded_28 < 3u32) {
+                let loaded_19 = part_2;
+                if !(loaded_19 < 3u32) {
                     break;
                 }
-                let loaded_29 = part_2;
-                let loaded_30 = part_2;
-                let loaded_31 = machine.load::<[M::F; 4]>(
+                let loaded_20 = part_2;
+                let loaded_21 = part_2;
+                let loaded_22 = machine.load::<[M::F; 4]>(
                     Global::Tile,
-                    4 * (found.wrapping_add(loaded_30.wrapping_mul(LINE)) as usize),
+                    4 * (found.wrapping_add(loaded_21.wrapping_mul(LINE)) as usize),
                 );
                 machine.store::<[M::F; 4]>(
                     Global::Rotations,
-                    4 * (stored.wrapping_add(loaded_29.wrapping_mul(LINE)) as usize),
-                    loaded_31,
+                    4 * (stored.wrapping_add(loaded_20.wrapping_mul(LINE)) as usize),
+                    loaded_22,
                 );
-                let loaded_32 = part_2;
-                part_2 = loaded_32.wrapping_add(1u32);
+                let loaded_23 = part_2;
+                part_2 = loaded_23.wrapping_add(1u32);
             }
         } else {
-            let _block = machine.block(line!(), 13);
-            let loaded_33 = end;
-            let shift = values.wrapping_add(lanes.wrapping_sub(loaded_33).wrapping_mul(3u32));
-            let loaded_34 = end;
-            let loaded_35 = end;
-            let parts_end = (if count < loaded_35 { count } else { loaded_34 }).wrapping_mul(3u32);
-            let loaded_36 = begin;
-            part_3 = loaded_36.wrapping_mul(3u32).wrapping_add(lane);
+            let _block = machine.block(line!(), 18);
+            let loaded_24 = first_j;
+            let loaded_25 = first_j;
+            let first_lane = if (loaded_25 as i32) < 0i32 {
+                0u32.wrapping_sub(loaded_24)
+            } else {
+                0u32
+            };
+            let loaded_26 = first_j;
+            let last_j = loaded_26.wrapping_add(all.sample_mask);
+            end_lane = used_lanes;
+            if last_j >= count {
+                let _block = machine.block(line!(), 11);
+                let missing = if all.track_mask != 0u32 {
+                    lanes
+                } else {
+                    last_j.wrapping_add(1u32).wrapping_sub(count)
+                };
+                let loaded_27 = end_lane;
+                let loaded_28 = end_lane;
+                let loaded_29 = end_lane;
+                end_lane = loaded_27.wrapping_sub(if missing > loaded_29 {
+                    loaded_28
+                } else {
+                    missing
+                });
+            }
+            let loaded_30 = first_j;
+            let stored_2 = first
+                .wrapping_mul(3u32)
+                .wrapping_add(loaded_30.wrapping_mul(stride));
+            part_3 = first_lane.wrapping_mul(3u32).wrapping_add(lane);
             loop {
-                let _block = machine.block(line!(), 13);
-                let loaded_37 = part_3;
-                if !(loaded_37 < parts_end) {
+                let _block = machine.block(line!(), 14);
+                let loaded_31 = part_3;
+                let loaded_32 = end_lane;
+                if !(loaded_31 < loaded_32.wrapping_mul(3u32)) {
                     break;
                 }
-                let loaded_38 = part_3;
-                let loaded_39 = part_3;
-                let loaded_40 = machine
-                    .load::<[M::F; 4]>(Global::Tile, 4 * (shift.wrapping_add(loaded_39) as usize));
+                let loaded_33 = part_3;
+                let loaded_34 = part_3;
+                let loaded_35 = machine
+                    .load::<[M::F; 4]>(Global::Tile, 4 * (values.wrapping_add(loaded_34) as usize));
                 machine.store::<[M::F; 4]>(
                     Global::Rotations,
-                    4 * (first.wrapping_mul(3u32).wrapping_add(loaded_38) as usize),
-                    loaded_40,
+                    4 * (stored_2.wrapping_add(loaded_33) as usize),
+                    loaded_35,
                 );
-                let loaded_41 = part_3;
-                part_3 = loaded_41.wrapping_add(lanes);
+                let loaded_36 = part_3;
+                part_3 = loaded_36.wrapping_add(lanes);
             }
         }
-        let loaded_42 = end;
-        begin = loaded_42;
-        let loaded_43 = end;
-        end = loaded_43.wrapping_add(lanes);
-        let loaded_44 = iteration;
-        iteration = loaded_44.wrapping_add(1u32);
-        let loaded_45 = iteration;
-        if loaded_45 >= iterations {
+        let loaded_37 = first_j;
+        first_j = loaded_37.wrapping_add(all.step);
+        let loaded_38 = iteration;
+        iteration = loaded_38.wrapping_add(1u32);
+        let loaded_39 = iteration;
+        if loaded_39 >= iterations {
             break;
         }
     }
@@ -4984,7 +5184,7 @@ pub(crate) fn move_of<M: Machine>(machine: &M, speed: u32, time: [u32; 2]) -> Cr
     }
 }
 
-pub(crate) fn near_distance<M: Machine>(machine: &M, first: i32, j: u32) -> M::F {
+pub(crate) fn near_distance<M: Machine>(machine: &M, at: i32) -> M::F {
     const OF_KERNELS: [u8; 194] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0,
@@ -4995,21 +5195,21 @@ pub(crate) fn near_distance<M: Machine>(machine: &M, first: i32, j: u32) -> M::F
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
-        0 => near_distance_of_near_frame(machine, first, j),
-        _ => near_distance_of_near_time(machine, first, j),
+        0 => near_distance_of_near_frame(machine, at),
+        _ => near_distance_of_near_time(machine, at),
     }
 }
 
 /// A whole number of frames below 2^24, which is exact in f32.
-pub(crate) fn near_distance_of_near_frame<M: Machine>(machine: &M, first: i32, j: u32) -> M::F {
-    let _block = machine.block(line!(), 3);
-    M::F::of(first.wrapping_add(j as i32) as f32)
+pub(crate) fn near_distance_of_near_frame<M: Machine>(machine: &M, at: i32) -> M::F {
+    let _block = machine.block(line!(), 1);
+    M::F::of(at as f32)
 }
 
 /// How far a sample lies from its segment's middle, when samples are explicit times: all are listed.
-pub(crate) fn near_distance_of_near_time<M: Machine>(machine: &M, first: i32, j: u32) -> M::F {
+pub(crate) fn near_distance_of_near_time<M: Machine>(machine: &M, at: i32) -> M::F {
     let _block = machine.block(line!(), 1);
-    let result = distance_from_middle(machine, first, j);
+    let result = distance_from_middle(machine, at, 0u32);
     result
 }
 
@@ -6868,7 +7068,6 @@ pub(crate) fn store_with_care<M: Machine>(
     item: SpreadRun<M::F>,
     location: [u32; 3],
     first_j: u32,
-    lanes: u32,
     repetition: u32,
 ) {
     const OF_KERNELS: [u8; 194] = [
@@ -6881,8 +7080,8 @@ pub(crate) fn store_with_care<M: Machine>(
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
-        0 => store_with_care_of_alone(machine, item, location, first_j, lanes, repetition),
-        _ => store_with_care_of_alone_2(machine, item, location, first_j, lanes, repetition),
+        0 => store_with_care_of_alone(machine, item, location, first_j, repetition),
+        _ => store_with_care_of_alone_2(machine, item, location, first_j, repetition),
     }
 }
 
@@ -6892,51 +7091,64 @@ pub(crate) fn store_with_care_of_alone<M: Machine>(
     item: SpreadRun<M::F>,
     location: [u32; 3],
     first_j: u32,
-    lanes: u32,
     repetition: u32,
 ) {
     let mut j: u32 = Default::default();
-    let _block = machine.block(line!(), 12);
+    let _block = machine.block(line!(), 14);
     let count = sample_count(machine, item);
     let first = location[1];
+    let stride = machine.load::<u32>(Global::Dispatch, 9);
+    let step = machine.load::<u32>(Global::Dispatch, 7);
     j = first_j;
     if item.count & IS_CONSTANT != 0u32 {
         let _block = machine.block(line!(), 7);
         let constant = constant_of_run(machine, item.source, repetition);
         let loaded = j;
         if loaded < count {
-            let _block = machine.block(line!(), 3);
+            let _block = machine.block(line!(), 4);
             let loaded_2 = j;
-            store(machine, first.wrapping_add(loaded_2), constant);
+            store(
+                machine,
+                first.wrapping_add(loaded_2.wrapping_mul(stride)),
+                constant,
+            );
         }
         let loaded_3 = j;
-        j = loaded_3.wrapping_add(lanes);
+        j = loaded_3.wrapping_add(step);
         loop {
-            let _block = machine.block(line!(), 9);
+            let _block = machine.block(line!(), 10);
             let loaded_4 = j;
             if !(loaded_4 < count) {
                 break;
             }
             let loaded_5 = j;
-            store(machine, first.wrapping_add(loaded_5), constant);
+            store(
+                machine,
+                first.wrapping_add(loaded_5.wrapping_mul(stride)),
+                constant,
+            );
             let loaded_6 = j;
-            j = loaded_6.wrapping_add(lanes);
+            j = loaded_6.wrapping_add(step);
         }
         return;
     }
     let segment = segment_at_arc_segment(machine, location[0]);
     let loaded_7 = j;
     if loaded_7 < count {
-        let _block = machine.block(line!(), 5);
+        let _block = machine.block(line!(), 6);
         let loaded_8 = j;
         let loaded_9 = j;
         let result = sample_of_arc_segment(machine, item, segment, loaded_9, repetition);
-        store(machine, first.wrapping_add(loaded_8), result);
+        store(
+            machine,
+            first.wrapping_add(loaded_8.wrapping_mul(stride)),
+            result,
+        );
     }
     let loaded_10 = j;
-    j = loaded_10.wrapping_add(lanes);
+    j = loaded_10.wrapping_add(step);
     loop {
-        let _block = machine.block(line!(), 11);
+        let _block = machine.block(line!(), 12);
         let loaded_11 = j;
         if !(loaded_11 < count) {
             break;
@@ -6944,9 +7156,13 @@ pub(crate) fn store_with_care_of_alone<M: Machine>(
         let loaded_12 = j;
         let loaded_13 = j;
         let result_2 = sample_of_arc_segment(machine, item, segment, loaded_13, repetition);
-        store(machine, first.wrapping_add(loaded_12), result_2);
+        store(
+            machine,
+            first.wrapping_add(loaded_12.wrapping_mul(stride)),
+            result_2,
+        );
         let loaded_14 = j;
-        j = loaded_14.wrapping_add(lanes);
+        j = loaded_14.wrapping_add(step);
     }
 }
 
@@ -6956,51 +7172,64 @@ pub(crate) fn store_with_care_of_alone_2<M: Machine>(
     item: SpreadRun<M::F>,
     location: [u32; 3],
     first_j: u32,
-    lanes: u32,
     repetition: u32,
 ) {
     let mut j: u32 = Default::default();
-    let _block = machine.block(line!(), 12);
+    let _block = machine.block(line!(), 14);
     let count = sample_count(machine, item);
     let first = location[1];
+    let stride = machine.load::<u32>(Global::Dispatch, 9);
+    let step = machine.load::<u32>(Global::Dispatch, 7);
     j = first_j;
     if item.count & IS_CONSTANT != 0u32 {
         let _block = machine.block(line!(), 7);
         let constant = constant_of_run(machine, item.source, repetition);
         let loaded = j;
         if loaded < count {
-            let _block = machine.block(line!(), 3);
+            let _block = machine.block(line!(), 4);
             let loaded_2 = j;
-            store(machine, first.wrapping_add(loaded_2), constant);
+            store(
+                machine,
+                first.wrapping_add(loaded_2.wrapping_mul(stride)),
+                constant,
+            );
         }
         let loaded_3 = j;
-        j = loaded_3.wrapping_add(lanes);
+        j = loaded_3.wrapping_add(step);
         loop {
-            let _block = machine.block(line!(), 9);
+            let _block = machine.block(line!(), 10);
             let loaded_4 = j;
             if !(loaded_4 < count) {
                 break;
             }
             let loaded_5 = j;
-            store(machine, first.wrapping_add(loaded_5), constant);
+            store(
+                machine,
+                first.wrapping_add(loaded_5.wrapping_mul(stride)),
+                constant,
+            );
             let loaded_6 = j;
-            j = loaded_6.wrapping_add(lanes);
+            j = loaded_6.wrapping_add(step);
         }
         return;
     }
     let segment = segment_at_polynomial_segment(machine, location[0]);
     let loaded_7 = j;
     if loaded_7 < count {
-        let _block = machine.block(line!(), 5);
+        let _block = machine.block(line!(), 6);
         let loaded_8 = j;
         let loaded_9 = j;
         let result = sample_of_polynomial_segment(machine, item, segment, loaded_9, repetition);
-        store(machine, first.wrapping_add(loaded_8), result);
+        store(
+            machine,
+            first.wrapping_add(loaded_8.wrapping_mul(stride)),
+            result,
+        );
     }
     let loaded_10 = j;
-    j = loaded_10.wrapping_add(lanes);
+    j = loaded_10.wrapping_add(step);
     loop {
-        let _block = machine.block(line!(), 11);
+        let _block = machine.block(line!(), 12);
         let loaded_11 = j;
         if !(loaded_11 < count) {
             break;
@@ -7008,9 +7237,13 @@ pub(crate) fn store_with_care_of_alone_2<M: Machine>(
         let loaded_12 = j;
         let loaded_13 = j;
         let result_2 = sample_of_polynomial_segment(machine, item, segment, loaded_13, repetition);
-        store(machine, first.wrapping_add(loaded_12), result_2);
+        store(
+            machine,
+            first.wrapping_add(loaded_12.wrapping_mul(stride)),
+            result_2,
+        );
         let loaded_14 = j;
-        j = loaded_14.wrapping_add(lanes);
+        j = loaded_14.wrapping_add(step);
     }
 }
 

@@ -63,6 +63,8 @@ pub(crate) struct VulkanEngine {
     pub(crate) device: Arc<LogicalDevice>,
     /// Pipelines, which are made when they are first needed.
     pipelines: Mutex<[Option<Arc<Pipeline>>; KERNELS.len()]>,
+    /// Kernels in whose place others are used, because they differ from the CPU.
+    replaced: Mutex<Vec<KernelCheck>>,
     pub(crate) in_flight: Exclusive<Vec<InFlight<WorkLists>>>,
     pub(crate) keys_in_flight: Exclusive<Vec<InFlight<KeyUploads>>>,
     pub(crate) in_flight_count: usize,
@@ -111,6 +113,7 @@ impl VulkanEngine {
         let bytes = |bytes| usize::try_from(bytes).unwrap_or(usize::MAX);
         Self {
             pipelines: Mutex::new([const { None }; KERNELS.len()]),
+            replaced: Mutex::default(),
             in_flight: Exclusive::default(),
             keys_in_flight: Exclusive::default(),
             in_flight_count,
@@ -212,23 +215,68 @@ impl VulkanEngine {
 
     /// Refuses a kernel that differs from the CPU, unless inexact devices are allowed.
     fn trust(&self, kernel: Kernel, pipeline: &Pipeline) -> Result<(), VulkanError> {
-        let passes = &self.device.passes;
-        let pass = KernelPass::new(&self.device.physical, pipeline.code_hash);
-        if passes.has(&pass) {
-            return Ok(());
-        }
-        let check = kernel_check::check(kernel, pipeline)?;
-        if check.differing == 0 {
-            passes.remember([pass]);
-        } else if !self.allow_inexact {
-            return Err(VulkanError::InexactKernel {
+        match self.difference(kernel, pipeline)? {
+            Some(check) if !self.allow_inexact => Err(VulkanError::InexactKernel {
                 device: self.device.physical.info.name.clone(),
                 kernel: check.name,
                 differing: check.differing,
                 total: check.total,
-            });
+            }),
+            _ => Ok(()),
         }
-        Ok(())
+    }
+
+    /// The check of a kernel that differs from the CPU; `None` if it does not. It is not run if it is known to pass.
+    fn difference(
+        &self,
+        kernel: Kernel,
+        pipeline: &Pipeline,
+    ) -> Result<Option<KernelCheck>, VulkanError> {
+        let passes = &self.device.passes;
+        let pass = KernelPass::new(&self.device.physical, pipeline.code_hash);
+        if passes.has(&pass) {
+            return Ok(None);
+        }
+        let check = kernel_check::check(kernel, pipeline)?;
+        if check.differing > 0 {
+            return Ok(Some(check));
+        }
+        passes.remember([pass]);
+        Ok(None)
+    }
+
+    /// Whether the engine evaluates with a kernel where others could take its place: the device runs it, and its bits are
+    /// the CPU's. A kernel that differs is refused here even if inexact devices are allowed, because the others need not
+    /// differ; it is listed as [`replaced`](KernelCheck::replaced). Other errors are left to the first use of the kernel.
+    pub(crate) fn uses(&self, kernel: Kernel) -> bool {
+        if !Pipeline::can_run(&self.device, kernel) {
+            return false;
+        }
+        let name = kernel.code(self.device.variants()).0;
+        let is_replaced = |check: &KernelCheck| check.name == name;
+        if !kernel.is_replaceable() || lock(&self.pipelines)[kernel as usize].is_some() {
+            return true;
+        }
+        if lock(&self.replaced).iter().any(is_replaced) {
+            return false;
+        }
+        let Ok(made) = Pipeline::new(&self.device, kernel, Exactness::Demanded) else {
+            return true;
+        };
+        match self.difference(kernel, &made) {
+            Ok(Some(check)) => {
+                let mut replaced = lock(&self.replaced);
+                if !replaced.iter().any(is_replaced) {
+                    replaced.push(check);
+                }
+                false
+            }
+            Ok(None) => {
+                lock(&self.pipelines)[kernel as usize].get_or_insert(Arc::new(made));
+                true
+            }
+            Err(_) => true,
+        }
     }
 
     /// Checks every kernel, while `each` returns true; with `only_unknown`, the kernels that are known to pass are
@@ -292,11 +340,16 @@ impl VulkanEngine {
 
     fn known_kernel(&self, code: &KernelCode) -> KernelCheck {
         let (name, ..) = code.kernel.code(self.device.variants());
+        let mut replaced = lock(&self.replaced).clone().into_iter();
+        if let Some(check) = replaced.find(|check| check.name == name) {
+            return check;
+        }
         let hash = Pipeline::code_hash(&self.device, code.kernel);
         KernelCheck {
             name,
             total: 0,
             differing: 0,
+            replaced: false,
             remembered: self
                 .device
                 .passes

@@ -145,11 +145,13 @@ pub(crate) fn check(kernel: Kernel, pipeline: &Pipeline) -> Result<KernelCheck, 
         total: 0,
         differing: 0,
         remembered: false,
+        replaced: false,
     };
     for trial in trials(kernel, &mut Random::canonical()) {
         let [differing, total] = trial.differing(kernel, pipeline)?;
         check.differing += differing;
         check.total += total;
     }
+    check.replaced = check.differing > 0 && kernel.is_replaceable();
     Ok(check)
 }
