@@ -63,6 +63,7 @@ pub(crate) mod instance;
 pub(crate) mod job;
 pub(crate) mod kernel_check;
 mod machine;
+pub(crate) mod motion;
 pub(crate) mod opened;
 pub(crate) mod passes;
 pub(crate) mod physical;
