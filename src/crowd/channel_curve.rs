@@ -3,7 +3,8 @@
 use bytemuck::Zeroable as _;
 
 use crate::shader::{
-    CrowdSpan, FORM_ARC, FORM_CONSTANT, FORM_CUBIC, FORM_KEYS, FORM_LINE, FORM_PACKED, ON_KEY, POWERS,
+    CrowdSpan, FORM_ARC, FORM_CONSTANT, FORM_CUBIC, FORM_KEYS, FORM_LINE, FORM_PACKED, ON_KEY,
+    POWERS,
 };
 use crate::simd::lanes::{Lanes, MAX_LANES};
 use crate::twin::arc_between::arc_between;

@@ -7,9 +7,7 @@ use crate::crowd::states::{FrameStep, MotionTables, check_clips, check_steps};
 use crate::crowd_error::CrowdError;
 use crate::engine::Engine;
 use crate::gpu::external::ExportedResult;
-use crate::gpu::motion::{
-    MappedStates, MotionSource, ResidentMotions, StateSteps, StatesRequest,
-};
+use crate::gpu::motion::{MappedStates, MotionSource, ResidentMotions, StateSteps, StatesRequest};
 use crate::machine::error::EvaluateError;
 use crate::output::states::StateArray;
 use crate::shader::MotionSample;

@@ -137,7 +137,9 @@ impl ResidentMotions {
         ];
         let bytes = tables.iter().map(|table| table.len() as u64).sum();
         let memory = engine.device.physical.info.device_local_memory;
-        let limit = engine.clip_bytes.map_or(memory, |budget| memory.min(budget as u64));
+        let limit = engine
+            .clip_bytes
+            .map_or(memory, |budget| memory.min(budget as u64));
         if bytes > limit {
             let subject = SUBJECT;
             return Err(VulkanError::TooLarge {
@@ -220,8 +222,8 @@ impl ResidentMotions {
     /// The number of instances of a window.
     fn window(&self, shape: &StatesShape<'_>) -> Result<usize, VulkanError> {
         let physical = &self.engine.device.physical;
-        let largest = (physical.info.max_storage_buffer_range)
-            .min(physical.info.max_memory_allocation_size);
+        let largest =
+            (physical.info.max_storage_buffer_range).min(physical.info.max_memory_allocation_size);
         let limit = match physical.info.kind {
             DeviceKind::Cpu => SOFTWARE_WINDOW,
             _ => WINDOW,

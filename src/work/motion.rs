@@ -35,7 +35,12 @@ impl StatesShape<'_> {
 
     fn has_velocities(&self) -> bool {
         let mut arrays = self.arrays.iter();
-        arrays.any(|array| matches!(array, StateArray::Velocities | StateArray::AngularVelocities))
+        arrays.any(|array| {
+            matches!(
+                array,
+                StateArray::Velocities | StateArray::AngularVelocities
+            )
+        })
     }
 }
 
@@ -99,7 +104,10 @@ pub(crate) fn record_window(
         ..arguments
     };
     dispatch(recording, set, of_joints);
-    let is_in_world = shape.arrays.iter().any(|&array| array != StateArray::Rotations);
+    let is_in_world = shape
+        .arrays
+        .iter()
+        .any(|&array| array != StateArray::Rotations);
     if is_in_world && shape.links > 0 {
         let set = recording.set(Kernel::MotionWalk, [links, states].map(Into::into));
         let of_samples = MotionDispatch {

@@ -1,7 +1,7 @@
 //! States of clips that lie on a device: the CPU's bits.
 
-use super::states::{StateResults, TICKS, instances, sets, states};
 use super::skeleton;
+use super::states::{StateResults, TICKS, instances, sets, states};
 use crate::support::{Random, vulkan_devices};
 use tumble::crowd::{
     CrowdError, DeviceMotions, FrameStep, KeyPrecision, MotionBuilder, MotionStates, MotionTables,
@@ -57,7 +57,11 @@ fn states_have_the_bits_of_the_cpu_in_every_form_of_clips() {
     for (method, vectors, precision) in [
         (method::SLERP, VectorMethod::Linear, KeyPrecision::Exact),
         (method::SLERP, VectorMethod::Linear, KeyPrecision::Packed),
-        (method::BESSEL_OVERHAUSER, VectorMethod::BesselOverhauser, KeyPrecision::Exact),
+        (
+            method::BESSEL_OVERHAUSER,
+            VectorMethod::BesselOverhauser,
+            KeyPrecision::Exact,
+        ),
         (method::STEP, VectorMethod::Step, KeyPrecision::Exact),
     ] {
         let (tables, spans, cells) = tables(&mut random, joints, (method, vectors), precision);
@@ -74,7 +78,10 @@ fn states_have_the_bits_of_the_cpu_in_every_form_of_clips() {
                 let (found, ranges) = of_device.sample(&at, None, arrays).unwrap();
                 for (&array, range) in arrays.iter().zip(ranges) {
                     let found = &found.bytes()[range];
-                    assert!(found == bits(&expected, array), "{array} {method:?} {of_device:?}");
+                    assert!(
+                        found == bits(&expected, array),
+                        "{array} {method:?} {of_device:?}"
+                    );
                 }
             }
         }
@@ -83,13 +90,22 @@ fn states_have_the_bits_of_the_cpu_in_every_form_of_clips() {
             angular_velocities: &mut expected.angular_velocities,
             ..MotionStates::default()
         };
-        tables.differences_into(&cpu, parts, &at, &steps, differences).unwrap();
+        tables
+            .differences_into(&cpu, parts, &at, &steps, differences)
+            .unwrap();
         for of_device in &motions {
-            let arrays = [StateArray::AngularVelocities, StateArray::Rotations, StateArray::Velocities];
+            let arrays = [
+                StateArray::AngularVelocities,
+                StateArray::Rotations,
+                StateArray::Velocities,
+            ];
             let (found, ranges) = of_device.sample(&at, Some(&steps), &arrays).unwrap();
             for (array, range) in arrays.into_iter().zip(ranges) {
                 let found = &found.bytes()[range];
-                assert!(found == bits(&expected, array), "{array} {method:?} {of_device:?}");
+                assert!(
+                    found == bits(&expected, array),
+                    "{array} {method:?} {of_device:?}"
+                );
             }
         }
     }
@@ -140,7 +156,13 @@ fn requests_that_cannot_be_met_are_refused() {
         let missing = motions.sample(&[(3, 0)], None, arrays).unwrap_err();
         assert!(matches!(missing, CrowdError::Missing { index: 3, .. }));
         let steps = motions.sample(&[(0, 0)], Some(&[]), arrays).unwrap_err();
-        assert!(matches!(steps, CrowdError::OutputLength { length: 0, needed: 1 }));
+        assert!(matches!(
+            steps,
+            CrowdError::OutputLength {
+                length: 0,
+                needed: 1
+            }
+        ));
         // The budget is that of the engine.
         let mut options = EngineOptions::default();
         options.memory = Some(2 * motions.bytes() - 2);

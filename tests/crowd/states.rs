@@ -83,7 +83,11 @@ pub(super) fn states(
 }
 
 /// Instances in every clip, within it, at its ends and behind.
-pub(super) fn instances(random: &mut Random, tables: &MotionTables, count: usize) -> Vec<(u32, u32)> {
+pub(super) fn instances(
+    random: &mut Random,
+    tables: &MotionTables,
+    count: usize,
+) -> Vec<(u32, u32)> {
     let one = |i: usize| {
         let clip = i % tables.clip_count();
         let ticks = tables.ticks(clip).unwrap();

@@ -70,8 +70,16 @@ fn joints(random: &mut Random, moves: u32) -> Trial {
         CrowdSpan {
             start: start | is_key,
             whole: (start + TICKS_OF_SPAN / 2) as i32,
-            scale: if is_last { 0.0 } else { (1.0 + random.parameter()) / TICKS_OF_SPAN as f32 },
-            offset: if is_last { 0.0 } else { 0.01 * random.parameter() },
+            scale: if is_last {
+                0.0
+            } else {
+                (1.0 + random.parameter()) / TICKS_OF_SPAN as f32
+            },
+            offset: if is_last {
+                0.0
+            } else {
+                0.01 * random.parameter()
+            },
         }
     };
     // Rotations for all forms: those of a curve have the room of polynomials.
@@ -80,7 +88,13 @@ fn joints(random: &mut Random, moves: u32) -> Trial {
     let cells: Vec<[f32; 4]> = (0..room + 4).map(|_| random.rotation()).collect();
     let channel = |random: &mut Random, kind: u32| {
         let forms: &[u32] = match kind {
-            ROTATION => &[FORM_CONSTANT, FORM_ARC, FORM_POLYNOMIAL, FORM_KEYS, FORM_PACKED],
+            ROTATION => &[
+                FORM_CONSTANT,
+                FORM_ARC,
+                FORM_POLYNOMIAL,
+                FORM_KEYS,
+                FORM_PACKED,
+            ],
             _ => &[FORM_CONSTANT, FORM_CUBIC, FORM_LINE],
         };
         let form = forms[random.below(forms.len() as u32) as usize];
@@ -93,8 +107,9 @@ fn joints(random: &mut Random, moves: u32) -> Trial {
     };
     let spans: Vec<CrowdSpan> = (0..4 * SPANS).map(|index| span(random, index)).collect();
     let channels = 2 * JOINTS * CHANNELS;
-    let channels: Vec<CrowdChannel> =
-        (0..channels).map(|index| channel(random, index % CHANNELS)).collect();
+    let channels: Vec<CrowdChannel> = (0..channels)
+        .map(|index| channel(random, index % CHANNELS))
+        .collect();
     // Some at keys, some behind the end.
     let sample = |random: &mut Random| MotionSample {
         clip: random.below(2),
@@ -138,7 +153,9 @@ fn differences(random: &mut Random) -> Trial {
     let mut before = states(random, 3 * INSTANCES);
     let of_instances = (INSTANCES * JOINTS * STATE_VECTORS) as usize;
     before.copy_within(of_instances..of_instances + 40, 2 * of_instances);
-    let rates: Vec<f32> = (0..FIRST + INSTANCES).map(|_| 60.0 * (1.0 + random.parameter())).collect();
+    let rates: Vec<f32> = (0..FIRST + INSTANCES)
+        .map(|_| 60.0 * (1.0 + random.parameter()))
+        .collect();
     let count = INSTANCES * JOINTS;
     let dispatch = MotionDispatch {
         first_sample: FIRST,
