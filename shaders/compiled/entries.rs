@@ -40,6 +40,7 @@ pub(crate) enum Global {
     Mixed,
     Positions,
     Probes,
+    Rates,
     Reference,
     Replies,
     Rotations,
@@ -48,6 +49,7 @@ pub(crate) enum Global {
     Segments,
     Smoothed,
     Spans,
+    States,
     Steps,
     Tile,
     TimeBases,
@@ -93,6 +95,7 @@ impl Global {
         Self::Mixed,
         Self::Positions,
         Self::Probes,
+        Self::Rates,
         Self::Reference,
         Self::Replies,
         Self::Rotations,
@@ -101,6 +104,7 @@ impl Global {
         Self::Segments,
         Self::Smoothed,
         Self::Spans,
+        Self::States,
         Self::Steps,
         Self::Tile,
         Self::TimeBases,
@@ -112,13 +116,13 @@ impl Global {
     ];
 }
 
-pub(crate) const GLOBALS: usize = 48;
+pub(crate) const GLOBALS: usize = 50;
 
 /// Variables of which each invocation has its own.
 pub(crate) const PRIVATE: [Global; 1] = [Global::FirstEntry];
 
 /// The variables that kernels bind, in the order of the bindings.
-const BOUND: [&[Global]; 25] = [
+const BOUND: [&[Global]; 29] = [
     &[Global::Probes, Global::Replies],
     &[
         Global::Segments,
@@ -232,6 +236,18 @@ const BOUND: [&[Global]; 25] = [
         Global::Cells,
         Global::Rotations,
     ],
+    &[
+        Global::Samples,
+        Global::Clips,
+        Global::TimeBases,
+        Global::Spans,
+        Global::Channels,
+        Global::Cells,
+        Global::States,
+    ],
+    &[Global::Links, Global::States],
+    &[Global::Rates, Global::States],
+    &[Global::States, Global::Values],
     &[Global::Keys, Global::Intervals, Global::Rotations],
 ];
 
@@ -250,32 +266,32 @@ const fn entry(
 }
 
 /// The entry points: those of the kernels in their order, and then those that read texel buffers.
-pub(crate) static ENTRIES: [Entry; 194] = [
+pub(crate) static ENTRIES: [Entry; 198] = [
     entry(0, None, 64, None),
-    entry(1, Some(Global::Dispatch), 64, Some(139)),
-    entry(1, Some(Global::Dispatch), 64, Some(140)),
-    entry(1, Some(Global::Dispatch), 64, Some(141)),
-    entry(1, Some(Global::Dispatch), 64, Some(142)),
     entry(1, Some(Global::Dispatch), 64, Some(143)),
     entry(1, Some(Global::Dispatch), 64, Some(144)),
     entry(1, Some(Global::Dispatch), 64, Some(145)),
     entry(1, Some(Global::Dispatch), 64, Some(146)),
-    entry(2, Some(Global::Dispatch), 64, Some(147)),
-    entry(2, Some(Global::Dispatch), 64, Some(148)),
-    entry(2, Some(Global::Dispatch), 64, Some(149)),
-    entry(2, Some(Global::Dispatch), 64, Some(150)),
+    entry(1, Some(Global::Dispatch), 64, Some(147)),
+    entry(1, Some(Global::Dispatch), 64, Some(148)),
+    entry(1, Some(Global::Dispatch), 64, Some(149)),
+    entry(1, Some(Global::Dispatch), 64, Some(150)),
     entry(2, Some(Global::Dispatch), 64, Some(151)),
     entry(2, Some(Global::Dispatch), 64, Some(152)),
     entry(2, Some(Global::Dispatch), 64, Some(153)),
     entry(2, Some(Global::Dispatch), 64, Some(154)),
-    entry(3, Some(Global::Dispatch), 64, Some(155)),
-    entry(3, Some(Global::Dispatch), 64, Some(156)),
-    entry(3, Some(Global::Dispatch), 64, Some(157)),
-    entry(3, Some(Global::Dispatch), 64, Some(158)),
+    entry(2, Some(Global::Dispatch), 64, Some(155)),
+    entry(2, Some(Global::Dispatch), 64, Some(156)),
+    entry(2, Some(Global::Dispatch), 64, Some(157)),
+    entry(2, Some(Global::Dispatch), 64, Some(158)),
     entry(3, Some(Global::Dispatch), 64, Some(159)),
     entry(3, Some(Global::Dispatch), 64, Some(160)),
     entry(3, Some(Global::Dispatch), 64, Some(161)),
     entry(3, Some(Global::Dispatch), 64, Some(162)),
+    entry(3, Some(Global::Dispatch), 64, Some(163)),
+    entry(3, Some(Global::Dispatch), 64, Some(164)),
+    entry(3, Some(Global::Dispatch), 64, Some(165)),
+    entry(3, Some(Global::Dispatch), 64, Some(166)),
     entry(4, Some(Global::Dispatch), 64, None),
     entry(4, Some(Global::Dispatch), 64, None),
     entry(4, Some(Global::Dispatch), 64, None),
@@ -308,30 +324,30 @@ pub(crate) static ENTRIES: [Entry; 194] = [
     entry(2, Some(Global::Dispatch), 128, None),
     entry(2, Some(Global::Dispatch), 128, None),
     entry(2, Some(Global::Dispatch), 128, None),
-    entry(1, Some(Global::Dispatch), 64, Some(163)),
-    entry(1, Some(Global::Dispatch), 64, Some(164)),
-    entry(1, Some(Global::Dispatch), 64, Some(165)),
-    entry(1, Some(Global::Dispatch), 64, Some(166)),
     entry(1, Some(Global::Dispatch), 64, Some(167)),
     entry(1, Some(Global::Dispatch), 64, Some(168)),
     entry(1, Some(Global::Dispatch), 64, Some(169)),
     entry(1, Some(Global::Dispatch), 64, Some(170)),
-    entry(2, Some(Global::Dispatch), 64, Some(171)),
-    entry(2, Some(Global::Dispatch), 64, Some(172)),
-    entry(2, Some(Global::Dispatch), 64, Some(173)),
-    entry(2, Some(Global::Dispatch), 64, Some(174)),
+    entry(1, Some(Global::Dispatch), 64, Some(171)),
+    entry(1, Some(Global::Dispatch), 64, Some(172)),
+    entry(1, Some(Global::Dispatch), 64, Some(173)),
+    entry(1, Some(Global::Dispatch), 64, Some(174)),
     entry(2, Some(Global::Dispatch), 64, Some(175)),
     entry(2, Some(Global::Dispatch), 64, Some(176)),
     entry(2, Some(Global::Dispatch), 64, Some(177)),
     entry(2, Some(Global::Dispatch), 64, Some(178)),
-    entry(3, Some(Global::Dispatch), 64, Some(179)),
-    entry(3, Some(Global::Dispatch), 64, Some(180)),
-    entry(3, Some(Global::Dispatch), 64, Some(181)),
-    entry(3, Some(Global::Dispatch), 64, Some(182)),
+    entry(2, Some(Global::Dispatch), 64, Some(179)),
+    entry(2, Some(Global::Dispatch), 64, Some(180)),
+    entry(2, Some(Global::Dispatch), 64, Some(181)),
+    entry(2, Some(Global::Dispatch), 64, Some(182)),
     entry(3, Some(Global::Dispatch), 64, Some(183)),
     entry(3, Some(Global::Dispatch), 64, Some(184)),
     entry(3, Some(Global::Dispatch), 64, Some(185)),
     entry(3, Some(Global::Dispatch), 64, Some(186)),
+    entry(3, Some(Global::Dispatch), 64, Some(187)),
+    entry(3, Some(Global::Dispatch), 64, Some(188)),
+    entry(3, Some(Global::Dispatch), 64, Some(189)),
+    entry(3, Some(Global::Dispatch), 64, Some(190)),
     entry(4, Some(Global::Dispatch), 64, None),
     entry(4, Some(Global::Dispatch), 64, None),
     entry(4, Some(Global::Dispatch), 64, None),
@@ -364,19 +380,19 @@ pub(crate) static ENTRIES: [Entry; 194] = [
     entry(2, Some(Global::Dispatch), 128, None),
     entry(2, Some(Global::Dispatch), 128, None),
     entry(2, Some(Global::Dispatch), 128, None),
-    entry(6, Some(Global::Rows), 64, Some(187)),
-    entry(6, Some(Global::Rows), 64, Some(188)),
-    entry(7, Some(Global::Rows), 64, Some(189)),
+    entry(6, Some(Global::Rows), 64, Some(191)),
+    entry(6, Some(Global::Rows), 64, Some(192)),
+    entry(7, Some(Global::Rows), 64, Some(193)),
     entry(8, Some(Global::Dispatch), 64, None),
     entry(9, Some(Global::Dispatch), 64, None),
     entry(10, Some(Global::Dispatch), 64, None),
     entry(11, Some(Global::Dispatch), 64, None),
     entry(12, Some(Global::Dispatch), 64, None),
     entry(13, Some(Global::Dispatch), 64, None),
-    entry(14, Some(Global::Dispatch), 64, Some(190)),
-    entry(14, Some(Global::Dispatch), 64, Some(191)),
-    entry(14, Some(Global::Dispatch), 64, Some(192)),
-    entry(14, Some(Global::Dispatch), 64, Some(193)),
+    entry(14, Some(Global::Dispatch), 64, Some(194)),
+    entry(14, Some(Global::Dispatch), 64, Some(195)),
+    entry(14, Some(Global::Dispatch), 64, Some(196)),
+    entry(14, Some(Global::Dispatch), 64, Some(197)),
     entry(15, Some(Global::Dispatch), 64, None),
     entry(16, Some(Global::Dispatch), 64, None),
     entry(17, Some(Global::Dispatch), 64, None),
@@ -390,6 +406,10 @@ pub(crate) static ENTRIES: [Entry; 194] = [
     entry(22, Some(Global::Dispatch), 64, None),
     entry(23, Some(Global::Dispatch), 64, None),
     entry(24, Some(Global::Dispatch), 64, None),
+    entry(25, Some(Global::Dispatch), 64, None),
+    entry(26, Some(Global::Dispatch), 64, None),
+    entry(27, Some(Global::Dispatch), 64, None),
+    entry(28, Some(Global::Dispatch), 64, None),
     entry(1, Some(Global::Dispatch), 64, None),
     entry(1, Some(Global::Dispatch), 64, None),
     entry(1, Some(Global::Dispatch), 64, None),
@@ -647,6 +667,23 @@ pub(crate) struct MatrixRows<F> {
 stored!(MatrixRows, (<F>), 12, first 0, second 4, third 8);
 
 #[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct MotionSample {
+    pub(crate) clip: u32,
+    pub(crate) tick: u32,
+}
+
+stored!(MotionSample, (), 2, clip 0, tick 1);
+
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct MotionSpan<F> {
+    pub(crate) index: u32,
+    pub(crate) parameter: F,
+    pub(crate) rate: F,
+}
+
+stored!(MotionSpan, (<F>), 3, index 0, parameter 1, rate 2);
+
+#[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct PolynomialSegment<F> {
     pub(crate) coefficients: [[F; 4]; 11],
 }
@@ -747,33 +784,13 @@ pub(crate) struct TwoKeysHoisted<F> {
 
 stored!(TwoKeysHoisted, (<F>), 1, parameter 0);
 
-/// The angle of the point (along, up), neither of which is negative, from 0 to pi/2; 0 for (0, 0).
-pub(crate) fn acute_arc_tangent<M: Machine>(machine: &M, up: M::F, along: M::F) -> M::F {
-    let _block = machine.block(line!(), 34);
-    let steep = up > along;
-    let large = if steep { up } else { along };
-    let small = if steep { along } else { up };
-    let divisor = if large == M::F::of(0.0) {
-        M::F::of(1.0)
-    } else {
-        large
-    };
-    let inverse = reciprocal(machine, divisor);
-    let near = small * inverse;
-    let t = near + (small - near * divisor) * inverse;
-    let z = t * t;
-    let high =
-        (((M::F::of(ARC_8) * z + M::F::of(ARC_7)) * z + M::F::of(ARC_6)) * z + M::F::of(ARC_5)) * z
-            + M::F::of(ARC_4);
-    let tail = (((high * z + M::F::of(ARC_3)) * z + M::F::of(ARC_2)) * z + M::F::of(ARC_1)) * z
-        + M::F::of(ARC_0);
-    let flat = tail * (z * t) + t;
-    if steep {
-        (M::F::of(HALF_PI) - flat) + M::F::of(HALF_PI_LOW)
-    } else {
-        flat
-    }
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct ValueAndSlope<F> {
+    pub(crate) value: [F; 4],
+    pub(crate) slope: [F; 4],
 }
+
+stored!(ValueAndSlope, (<F>), 8, value 0, slope 4);
 
 pub(crate) fn arc_between<M: Machine>(
     machine: &M,
@@ -934,6 +951,12 @@ pub(crate) fn canonical<M: Machine>(machine: &M, q: [M::F; 4]) -> [M::F; 4] {
     )
 }
 
+pub(crate) fn canonical3<M: Machine>(machine: &M, v: [M::F; 3]) -> [M::F; 4] {
+    let _block = machine.block(line!(), 1);
+    let result = canonical(machine, [v[0], v[1], v[2], M::F::of(0.0)]);
+    result
+}
+
 /// The Hamilton product of m and \[v, w].
 pub(crate) fn canonical_product<M: Machine>(
     machine: &M,
@@ -955,14 +978,14 @@ pub(crate) fn canonical_product<M: Machine>(
 }
 
 pub(crate) fn cell_at<M: Machine>(machine: &M, index: u32) -> [M::F; 4] {
-    const OF_KERNELS: [u8; 194] = [
+    const OF_KERNELS: [u8; 198] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1,
     ];
     match OF_KERNELS[machine.code()] {
         0 => cell_at_of_readers(machine, index),
@@ -1006,14 +1029,14 @@ pub(crate) fn cell_of<M: Machine>(machine: &M, corner: Corner, iteration: u32) -
 }
 
 pub(crate) fn channel_at<M: Machine>(machine: &M, index: u32) -> CrowdChannel {
-    const OF_KERNELS: [u8; 194] = [
+    const OF_KERNELS: [u8; 198] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1,
     ];
     match OF_KERNELS[machine.code()] {
         0 => channel_at_of_readers(machine, index),
@@ -1072,14 +1095,14 @@ pub(crate) fn composed<M: Machine>(
 }
 
 pub(crate) fn constant_at<M: Machine>(machine: &M, index: u32) -> [M::F; 4] {
-    const OF_KERNELS: [u8; 194] = [
+    const OF_KERNELS: [u8; 198] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1,
         1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
-        1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0,
+        1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => constant_at_of_readers(machine, index),
@@ -1202,6 +1225,8 @@ pub(crate) fn corner_of<M: Machine>(
     }
 }
 
+/// Products of vectors, in a fixed order of operations.
+/// Twin: src/math/quaternion.rs.
 pub(crate) fn cross3<M: Machine>(machine: &M, a: [M::F; 3], b: [M::F; 3]) -> [M::F; 3] {
     let _block = machine.block(line!(), 9);
     [
@@ -1212,14 +1237,14 @@ pub(crate) fn cross3<M: Machine>(machine: &M, a: [M::F; 3], b: [M::F; 3]) -> [M:
 }
 
 pub(crate) fn crowd_work<M: Machine>(machine: &M, index: u32) {
-    const OF_KERNELS: [u8; 194] = [
+    const OF_KERNELS: [u8; 198] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 1, 1, 2, 3, 4, 5, 0, 6, 7, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1,
     ];
     match OF_KERNELS[machine.code()] {
         0 => crowd_work_of_rotations(machine, index),
@@ -1493,14 +1518,14 @@ pub(crate) fn cubic_value<M: Machine>(
 }
 
 pub(crate) fn distance_at<M: Machine>(machine: &M, index: u32) -> M::F {
-    const OF_KERNELS: [u8; 194] = [
+    const OF_KERNELS: [u8; 198] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1,
-        1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1,
+        1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => distance_at_of_readers(machine, index),
@@ -1526,14 +1551,14 @@ pub(crate) fn distance_at_of_readers_2<M: Machine>(machine: &M, index: u32) -> M
 }
 
 pub(crate) fn distance_from_middle<M: Machine>(machine: &M, first: i32, j: u32) -> M::F {
-    const OF_KERNELS: [u8; 194] = [
+    const OF_KERNELS: [u8; 198] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0,
         0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1,
         1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1,
-        1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1,
+        1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => distance_from_middle_of_frame_distance(machine, first, j),
@@ -1576,14 +1601,14 @@ pub(crate) fn dot4<M: Machine>(machine: &M, a: [M::F; 4], b: [M::F; 4]) -> M::F 
 }
 
 pub(crate) fn entry_at<M: Machine>(machine: &M, index: u32) -> CrowdEntry {
-    const OF_KERNELS: [u8; 194] = [
+    const OF_KERNELS: [u8; 198] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 2, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 2, 2, 2, 2,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 2, 2, 2, 2,
     ];
     match OF_KERNELS[machine.code()] {
         0 => entry_at_of_readers(machine, index),
@@ -1788,6 +1813,26 @@ pub(crate) fn evaluate_with_polynomial_segment<M: Machine>(
     result
 }
 
+/// √x, rounded to nearest, for x from 2^-30 to 1, and for 0.
+pub(crate) fn exact_root<M: Machine>(machine: &M, x: M::F) -> M::F {
+    let _block = machine.block(line!(), 19);
+    if x == M::F::of(0.0) {
+        return M::F::of(0.0);
+    }
+    let near = root(machine, x);
+    let next = M::F::of_bits(near.bits().wrapping_add(1u32));
+    let before = M::F::of_bits(near.bits().wrapping_sub(1u32));
+    let result = rest_of_square(machine, x, near, (next - near) * M::F::of(0.5));
+    let is_more = result > M::F::of(0.0);
+    let result_2 = rest_of_square(machine, x, near, (before - near) * M::F::of(0.5));
+    let is_less = result_2 < M::F::of(0.0);
+    if is_more {
+        next
+    } else {
+        if is_less { before } else { near }
+    }
+}
+
 /// Finds the position in a time base of a layer of the workgroup's instances, as `crowd/times` does.
 pub(crate) fn find_position<M: Machine>(machine: &M, index: u32) {
     let _block = machine.block(line!(), 14);
@@ -1878,14 +1923,14 @@ pub(crate) async fn finish_2<M: Machine>(
     rotation: [M::F; 4],
     is_stored: bool,
 ) {
-    const OF_KERNELS: [u8; 194] = [
+    const OF_KERNELS: [u8; 198] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 2,
         3, 0, 1, 0, 1, 0, 0, 2, 3, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 2, 3, 0, 1, 0,
         1, 0, 0, 2, 3, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => finish_2_of_alone(machine, lane, index, rotation, is_stored).await,
@@ -2092,6 +2137,80 @@ pub(crate) fn flushed4<M: Machine>(machine: &M, q: [M::F; 4]) -> [M::F; 4] {
     [result, result_2, result_3, result_4]
 }
 
+/// Converts a joint's state from its parent's frame to the world.
+pub(crate) fn hang_on<M: Machine>(machine: &M, parent: u32, child: u32) {
+    let _block = machine.block(line!(), 26);
+    let above = machine.load::<[M::F; 4]>(
+        Global::States,
+        4 * (parent.wrapping_add(WORLD_ROTATION) as usize),
+    );
+    let loaded =
+        machine.load::<[M::F; 4]>(Global::States, 4 * (child.wrapping_add(POSITION) as usize));
+    let arm = rotated(machine, above, [loaded[0], loaded[1], loaded[2]]);
+    let loaded_2 =
+        machine.load::<[M::F; 4]>(Global::States, 4 * (parent.wrapping_add(POSITION) as usize));
+    let result = canonical3(
+        machine,
+        both([loaded_2[0], loaded_2[1], loaded_2[2]], arm, |x, y| x + y),
+    );
+    machine.store::<[M::F; 4]>(
+        Global::States,
+        4 * (child.wrapping_add(POSITION) as usize),
+        result,
+    );
+    let loaded_3 = machine.load::<[M::F; 4]>(
+        Global::States,
+        4 * (child.wrapping_add(WORLD_ROTATION) as usize),
+    );
+    let rotation = product(machine, above, loaded_3);
+    let result_2 = dot4(machine, rotation, rotation);
+    let scale = M::F::of(1.5) - M::F::of(0.5) * result_2;
+    let result_3 = canonical(machine, both(rotation, [scale; 4], |x, y| x * y));
+    machine.store::<[M::F; 4]>(
+        Global::States,
+        4 * (child.wrapping_add(WORLD_ROTATION) as usize),
+        result_3,
+    );
+    let loaded_4 = machine.load::<u32>(Global::Dispatch, 4);
+    if loaded_4 != 0u32 {
+        let _block = machine.block(line!(), 24);
+        let loaded_5 = machine.load::<[M::F; 4]>(
+            Global::States,
+            4 * (parent.wrapping_add(ANGULAR_VELOCITY) as usize),
+        );
+        let turning = [loaded_5[0], loaded_5[1], loaded_5[2]];
+        let loaded_6 =
+            machine.load::<[M::F; 4]>(Global::States, 4 * (parent.wrapping_add(VELOCITY) as usize));
+        let result_4 = cross3(machine, turning, arm);
+        let carried = both([loaded_6[0], loaded_6[1], loaded_6[2]], result_4, |x, y| {
+            x + y
+        });
+        let loaded_7 =
+            machine.load::<[M::F; 4]>(Global::States, 4 * (child.wrapping_add(VELOCITY) as usize));
+        let velocity = rotated(machine, above, [loaded_7[0], loaded_7[1], loaded_7[2]]);
+        let result_5 = canonical3(machine, both(carried, velocity, |x, y| x + y));
+        machine.store::<[M::F; 4]>(
+            Global::States,
+            4 * (child.wrapping_add(VELOCITY) as usize),
+            result_5,
+        );
+        let loaded_8 = machine.load::<[M::F; 4]>(
+            Global::States,
+            4 * (child.wrapping_add(ANGULAR_VELOCITY) as usize),
+        );
+        let angular = rotated(machine, above, [loaded_8[0], loaded_8[1], loaded_8[2]]);
+        let result_6 = canonical3(machine, both(turning, angular, |x, y| x + y));
+        machine.store::<[M::F; 4]>(
+            Global::States,
+            4 * (child.wrapping_add(ANGULAR_VELOCITY) as usize),
+            result_6,
+        );
+        return;
+    } else {
+        return;
+    }
+}
+
 /// Whether a position is one of an item's samples.
 pub(crate) fn has<M: Machine>(machine: &M, item: Item<M::F>, position: u32) -> bool {
     let _block = machine.block(line!(), 3);
@@ -2224,14 +2343,14 @@ pub(crate) async fn is_any<M: Machine>(machine: &M, condition: bool) -> bool {
 }
 
 pub(crate) fn item_at_item<M: Machine>(machine: &M, index: u32) -> Item<M::F> {
-    const OF_KERNELS: [u8; 194] = [
+    const OF_KERNELS: [u8; 198] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
-        1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1,
+        1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
+        1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => item_at_item_of_readers(machine, index),
@@ -2304,10 +2423,51 @@ pub(crate) fn item_of<M: Machine>(machine: &M, cell: Cell) -> u32 {
         .wrapping_add((block.starts << (!cell.position & 31u32)).count_ones())
 }
 
+/// The key at the end of a span. The last span is constant: its key is at both ends.
+pub(crate) fn key_after<M: Machine>(
+    machine: &M,
+    channel: CrowdChannel,
+    base: CrowdBase,
+    span: u32,
+) -> [M::F; 4] {
+    let _block = machine.block(line!(), 5);
+    let result = key_of(
+        machine,
+        channel,
+        if span.wrapping_add(1u32) == base.count {
+            span
+        } else {
+            span.wrapping_add(1u32)
+        },
+    );
+    result
+}
+
 pub(crate) fn key_at<M: Machine>(machine: &M, index: u32) -> [u32; 4] {
     let _block = machine.block(line!(), 1);
     let loaded = machine.load::<[u32; 4]>(Global::Keys, 4 * (index as usize));
     loaded
+}
+
+/// The key at the start of a span, of a channel that consists of keys.
+pub(crate) fn key_of<M: Machine>(machine: &M, channel: CrowdChannel, span: u32) -> [M::F; 4] {
+    let _block = machine.block(line!(), 6);
+    let index = channel.first.wrapping_add(span.wrapping_mul(channel.count));
+    if channel.form_and_base >> 24u32 == FORM_PACKED {
+        let _block = machine.block(line!(), 8);
+        let words = machine.load::<[u32; 4]>(Global::Cells, 4 * ((index >> 1u32) as usize));
+        let result = unpacked(
+            machine,
+            if index & 1u32 == 1u32 {
+                [words[2], words[3]]
+            } else {
+                [words[0], words[1]]
+            },
+        );
+        return result;
+    }
+    let result_2 = cell_at(machine, index);
+    result_2
 }
 
 /// A rotation, a translation or a scale under the next layer. For scales `reference` holds reciprocals.
@@ -2415,14 +2575,14 @@ pub(crate) fn layer_value<M: Machine>(
 }
 
 pub(crate) fn layered<M: Machine>(machine: &M, instance: u32, joint: u32, kind: u32) -> [M::F; 4] {
-    const OF_KERNELS: [u8; 194] = [
+    const OF_KERNELS: [u8; 198] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 1, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 1,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 1,
     ];
     match OF_KERNELS[machine.code()] {
         0 => layered_of_layers(machine, instance, joint, kind),
@@ -2536,6 +2696,28 @@ pub(crate) fn layered_of_plain<M: Machine>(
     result_3
 }
 
+/// The middle of a line, and its rise. Halves are added, so that no sum is too large.
+pub(crate) fn line_between<M: Machine>(
+    machine: &M,
+    start: [M::F; 4],
+    end: [M::F; 4],
+) -> ValueAndSlope<M::F> {
+    let _block = machine.block(line!(), 6);
+    let result = canonical(
+        machine,
+        both(
+            both(start, [M::F::of(0.5); 4], |x, y| x * y),
+            both(end, [M::F::of(0.5); 4], |x, y| x * y),
+            |x, y| x + y,
+        ),
+    );
+    let result_2 = canonical(machine, both(end, start, |x, y| x - y));
+    ValueAndSlope {
+        value: result,
+        slope: result_2,
+    }
+}
+
 /// Where a run of a repetition finds its segment (x) and its key (z), and stores its first sample (y).
 pub(crate) fn location_of<M: Machine>(
     machine: &M,
@@ -2563,15 +2745,15 @@ pub(crate) fn magnitude<M: Machine>(machine: &M, x: M::F) -> M::F {
 }
 
 pub(crate) async fn main<M: Machine>(machine: &M) {
-    const OF_KERNELS: [u8; 194] = [
+    const OF_KERNELS: [u8; 198] = [
         0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 2, 2, 2, 2, 2, 2, 2, 2, 3, 3, 3, 3, 3,
         3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 4, 5, 4, 4, 6, 7, 4, 5, 4, 5, 4, 4, 6, 7, 4, 5, 8, 8, 8,
         8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 9, 9, 9, 9, 9, 9, 9, 9, 10, 10, 10, 10, 10, 10, 10,
         10, 10, 10, 10, 10, 10, 10, 10, 10, 11, 12, 11, 11, 13, 14, 11, 12, 11, 12, 11, 11, 13, 14,
         11, 12, 15, 16, 17, 18, 18, 18, 18, 18, 18, 19, 19, 19, 19, 19, 19, 19, 19, 20, 19, 19, 21,
-        21, 22, 22, 23, 24, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 2, 2, 2, 2, 2, 2, 2, 2,
-        8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 9, 9, 9, 9, 9, 9, 9, 9, 15, 16, 17, 19, 19,
-        19, 19,
+        21, 22, 22, 23, 24, 24, 24, 24, 25, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 2, 2,
+        2, 2, 2, 2, 2, 2, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 9, 9, 9, 9, 9, 9, 9, 9,
+        15, 16, 17, 19, 19, 19, 19,
     ];
     match OF_KERNELS[machine.code()] {
         0 => main_of_self_test(machine).await,
@@ -2598,6 +2780,7 @@ pub(crate) async fn main<M: Machine>(machine: &M) {
         21 => main_of_whole_rotations(machine).await,
         22 => main_of_whole_matrices(machine).await,
         23 => main_of_subgroup_rotations(machine).await,
+        24 => main_of_motion(machine).await,
         _ => main_of_prepare_arcs(machine).await,
     }
 }
@@ -5091,6 +5274,23 @@ pub(crate) async fn main_of_subgroup_rotations<M: Machine>(machine: &M) {
     }
 }
 
+pub(crate) async fn main_of_motion<M: Machine>(machine: &M) {
+    let invocation = machine.ids().global_invocation_id;
+    let groups = machine.ids().num_workgroups;
+    let _block = machine.block(line!(), 6);
+    let index = invocation[1]
+        .wrapping_mul(groups[0].wrapping_mul(MOTION_WORKGROUP))
+        .wrapping_add(invocation[0]);
+    let loaded = machine.load::<u32>(Global::Dispatch, 0);
+    if index < loaded {
+        let _block = machine.block(line!(), 1);
+        motion_work(machine, index);
+        return;
+    } else {
+        return;
+    }
+}
+
 pub(crate) async fn main_of_prepare_arcs<M: Machine>(machine: &M) {
     let invocation = machine.ids().global_invocation_id;
     let groups = machine.ids().num_workgroups;
@@ -5157,6 +5357,290 @@ pub(crate) fn matrix_rows<M: Machine>(
     loaded
 }
 
+pub(crate) fn motion_work<M: Machine>(machine: &M, index: u32) {
+    const OF_KERNELS: [u8; 198] = [
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 2, 3, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+    ];
+    match OF_KERNELS[machine.code()] {
+        0 => motion_work_of_joints(machine, index),
+        1 => motion_work_of_walk(machine, index),
+        2 => motion_work_of_differences(machine, index),
+        _ => motion_work_of_store(machine, index),
+    }
+}
+
+pub(crate) fn motion_work_of_joints<M: Machine>(machine: &M, index: u32) {
+    let _block = machine.block(line!(), 22);
+    let loaded = machine.load::<u32>(Global::Dispatch, 2);
+    let sample_index = quotient(index, loaded);
+    let loaded_2 = machine.load::<u32>(Global::Dispatch, 2);
+    let joint = index.wrapping_sub(sample_index.wrapping_mul(loaded_2));
+    let loaded_3 = machine.load::<u32>(Global::Dispatch, 1);
+    let sample = machine.load::<MotionSample>(
+        Global::Samples,
+        2 * (loaded_3.wrapping_add(sample_index) as usize),
+    );
+    let clip = machine.load::<CrowdClip>(Global::Clips, 3 * (sample.clip as usize));
+    let tick = if sample.tick > clip.period {
+        clip.period
+    } else {
+        sample.tick
+    };
+    let loaded_4 = machine.load::<u32>(Global::Dispatch, 2);
+    let first = sample
+        .clip
+        .wrapping_mul(loaded_4)
+        .wrapping_add(joint)
+        .wrapping_mul(CHANNELS);
+    let state = index.wrapping_mul(STATE_VECTORS);
+    let loaded_5 = machine.load::<CrowdChannel>(
+        Global::Channels,
+        4 * (first.wrapping_add(ROTATION) as usize),
+    );
+    rotate(machine, loaded_5, clip, tick, state);
+    let loaded_6 = machine.load::<CrowdChannel>(
+        Global::Channels,
+        4 * (first.wrapping_add(TRANSLATION) as usize),
+    );
+    move_joint(machine, loaded_6, clip, tick, state);
+}
+
+pub(crate) fn motion_work_of_walk<M: Machine>(machine: &M, index: u32) {
+    let mut i: u32 = 0u32;
+    let _block = machine.block(line!(), 2);
+    let loaded = machine.load::<u32>(Global::Dispatch, 2);
+    let first = index.wrapping_mul(loaded);
+    loop {
+        let _block = machine.block(line!(), 14);
+        let loaded_2 = i;
+        let loaded_3 = machine.load::<u32>(Global::Dispatch, 3);
+        if !(loaded_2 < loaded_3) {
+            break;
+        }
+        let loaded_4 = i;
+        let link = machine.load::<CrowdLink>(Global::Links, 2 * (loaded_4 as usize));
+        hang_on(
+            machine,
+            first.wrapping_add(link.parent).wrapping_mul(STATE_VECTORS),
+            first.wrapping_add(link.joint).wrapping_mul(STATE_VECTORS),
+        );
+        let loaded_5 = i;
+        i = loaded_5.wrapping_add(1u32);
+    }
+}
+
+pub(crate) fn motion_work_of_differences<M: Machine>(machine: &M, index: u32) {
+    let _block = machine.block(line!(), 56);
+    let loaded = machine.load::<u32>(Global::Dispatch, 1);
+    let loaded_2 = machine.load::<u32>(Global::Dispatch, 2);
+    let rate = machine.load::<M::F>(
+        Global::Rates,
+        loaded.wrapping_add(quotient(index, loaded_2)) as usize,
+    );
+    let loaded_3 = machine.load::<u32>(Global::Dispatch, 0);
+    let before = loaded_3.wrapping_add(index).wrapping_mul(STATE_VECTORS);
+    let loaded_4 = machine.load::<u32>(Global::Dispatch, 0);
+    let after = 2u32
+        .wrapping_mul(loaded_4)
+        .wrapping_add(index)
+        .wrapping_mul(STATE_VECTORS);
+    let state = index.wrapping_mul(STATE_VECTORS);
+    let loaded_5 =
+        machine.load::<[M::F; 4]>(Global::States, 4 * (after.wrapping_add(POSITION) as usize));
+    let loaded_6 =
+        machine.load::<[M::F; 4]>(Global::States, 4 * (before.wrapping_add(POSITION) as usize));
+    let moved = both(
+        [loaded_5[0], loaded_5[1], loaded_5[2]],
+        [loaded_6[0], loaded_6[1], loaded_6[2]],
+        |x, y| x - y,
+    );
+    let result = canonical3(machine, both(moved, [rate; 3], |x, y| x * y));
+    machine.store::<[M::F; 4]>(
+        Global::States,
+        4 * (state.wrapping_add(VELOCITY) as usize),
+        result,
+    );
+    let start = machine.load::<[M::F; 4]>(
+        Global::States,
+        4 * (before.wrapping_add(WORLD_ROTATION) as usize),
+    );
+    let loaded_7 = machine.load::<[M::F; 4]>(
+        Global::States,
+        4 * (after.wrapping_add(WORLD_ROTATION) as usize),
+    );
+    let result_2 = product(
+        machine,
+        loaded_7,
+        [
+            [start[0], start[1], start[2]].map(|x| -x)[0],
+            [start[0], start[1], start[2]].map(|x| -x)[1],
+            [start[0], start[1], start[2]].map(|x| -x)[2],
+            start[3],
+        ],
+    );
+    let turned = flushed4(machine, result_2);
+    let sine = root(
+        machine,
+        (turned[0] * turned[0] + turned[1] * turned[1]) + turned[2] * turned[2],
+    );
+    let result_3 = magnitude(machine, turned[3]);
+    let result_4 = arc_tangent(machine, sine, result_3);
+    let angle = M::F::of(2.0) * result_4;
+    let divisor = if sine == M::F::of(0.0) {
+        M::F::of(1.0)
+    } else {
+        sine
+    };
+    let result_5 = reciprocal(machine, divisor);
+    let along = if sine == M::F::of(0.0) {
+        M::F::of(2.0)
+    } else {
+        angle * result_5
+    };
+    let scale = if turned[3] < M::F::of(0.0) {
+        -along
+    } else {
+        along
+    };
+    let result_6 = canonical3(
+        machine,
+        both(
+            [turned[0], turned[1], turned[2]],
+            [scale * rate; 3],
+            |x, y| x * y,
+        ),
+    );
+    machine.store::<[M::F; 4]>(
+        Global::States,
+        4 * (state.wrapping_add(ANGULAR_VELOCITY) as usize),
+        result_6,
+    );
+}
+
+/// `index` is a number of the result.
+pub(crate) fn motion_work_of_store<M: Machine>(machine: &M, index: u32) {
+    let _block = machine.block(line!(), 12);
+    let loaded = machine.load::<u32>(Global::Dispatch, 7);
+    let joint = quotient(index, loaded);
+    let loaded_2 = machine.load::<u32>(Global::Dispatch, 6);
+    let vector = joint.wrapping_mul(STATE_VECTORS).wrapping_add(loaded_2);
+    let loaded_3 = machine.load::<u32>(Global::Dispatch, 7);
+    let loaded_4 = machine.load::<u32>(
+        Global::States,
+        vector
+            .wrapping_mul(4u32)
+            .wrapping_add(index.wrapping_sub(joint.wrapping_mul(loaded_3))) as usize,
+    );
+    machine.store::<u32>(Global::Values, index as usize, loaded_4);
+}
+
+/// Stores the position and the velocity in the parent's frame.
+pub(crate) fn move_joint<M: Machine>(
+    machine: &M,
+    channel: CrowdChannel,
+    clip: CrowdClip,
+    tick: u32,
+    state: u32,
+) {
+    let mut value: [M::F; 4] = Default::default();
+    let mut velocity: [M::F; 4] = [M::F::of(0.0); 4];
+    let _block = machine.block(line!(), 16);
+    let base = machine.load::<CrowdBase>(
+        Global::TimeBases,
+        3 * (clip
+            .first_base
+            .wrapping_add(channel.form_and_base & 0xffffffu32) as usize),
+    );
+    let form = channel.form_and_base >> 24u32;
+    let position = position_in(machine, base, tick);
+    let span = position.span & TICKS;
+    let along = moving_span(machine, base, tick, span);
+    if form == FORM_LINE {
+        let _block = machine.block(line!(), 5);
+        let result = key_of(machine, channel, span);
+        value = result;
+        if position.span & ON_KEY == 0u32 {
+            let _block = machine.block(line!(), 7);
+            let loaded = value;
+            let result_2 = key_after(machine, channel, base, span);
+            let line = line_between(machine, loaded, result_2);
+            let result_3 = canonical(
+                machine,
+                both(
+                    both(line.slope, [position.parameter; 4], |x, y| x * y),
+                    line.value,
+                    |x, y| x + y,
+                ),
+            );
+            value = result_3;
+        }
+    } else {
+        let _block = machine.block(line!(), 2);
+        let result_4 = sampled(machine, channel, position);
+        value = result_4;
+    }
+    let loaded_2 = value;
+    machine.store::<[M::F; 4]>(
+        Global::States,
+        4 * (state.wrapping_add(POSITION) as usize),
+        [
+            [loaded_2[0], loaded_2[1], loaded_2[2]][0],
+            [loaded_2[0], loaded_2[1], loaded_2[2]][1],
+            [loaded_2[0], loaded_2[1], loaded_2[2]][2],
+            M::F::of(0.0),
+        ],
+    );
+    let loaded_3 = machine.load::<u32>(Global::Dispatch, 4);
+    if loaded_3 != 0u32 {
+        let _block = machine.block(line!(), 5);
+        if form == FORM_LINE {
+            let _block = machine.block(line!(), 7);
+            let result_5 = key_of(machine, channel, along.index);
+            let result_6 = key_after(machine, channel, base, along.index);
+            let line_2 = line_between(machine, result_5, result_6);
+            let result_7 = canonical3(
+                machine,
+                both(
+                    [line_2.slope[0], line_2.slope[1], line_2.slope[2]],
+                    [along.rate; 3],
+                    |x, y| x * y,
+                ),
+            );
+            velocity = result_7;
+        } else {
+            let _block = machine.block(line!(), 2);
+            if form != FORM_CONSTANT {
+                let _block = machine.block(line!(), 5);
+                let curve = value_and_slope(machine, channel, along, 4u32);
+                let result_8 = canonical3(
+                    machine,
+                    both(
+                        [curve.slope[0], curve.slope[1], curve.slope[2]],
+                        [along.rate; 3],
+                        |x, y| x * y,
+                    ),
+                );
+                velocity = result_8;
+            }
+        }
+        let loaded_4 = velocity;
+        machine.store::<[M::F; 4]>(
+            Global::States,
+            4 * (state.wrapping_add(VELOCITY) as usize),
+            loaded_4,
+        );
+        return;
+    } else {
+        return;
+    }
+}
+
 /// The product of a speed, below 2^23 in units of 2^-16, and a time, below 2^40.
 pub(crate) fn move_of<M: Machine>(machine: &M, speed: u32, time: [u32; 2]) -> CrowdMove {
     let _block = machine.block(line!(), 25);
@@ -5184,15 +5668,40 @@ pub(crate) fn move_of<M: Machine>(machine: &M, speed: u32, time: [u32; 2]) -> Cr
     }
 }
 
-pub(crate) fn near_distance<M: Machine>(machine: &M, at: i32) -> M::F {
-    const OF_KERNELS: [u8; 194] = [
+/// At the last key it is the span that ends there.
+pub(crate) fn moving_span<M: Machine>(
+    machine: &M,
+    base: CrowdBase,
+    tick: u32,
+    index: u32,
+) -> MotionSpan<M::F> {
+    let _block = machine.block(line!(), 15);
+    let span = machine
+        .load::<CrowdSpan<M::F>>(Global::Spans, 4 * (base.first.wrapping_add(index) as usize));
+    let is_end = (span.scale == M::F::of(0.0)) & (span.start & TICKS == tick) & (index > 0u32);
+    let moving = index.wrapping_sub(if is_end { 1u32 } else { 0u32 });
+    let along = machine.load::<CrowdSpan<M::F>>(
+        Global::Spans,
+        4 * (base.first.wrapping_add(moving) as usize),
+    );
+    let result = parameter_in(machine, along, tick);
+    let loaded = machine.load::<M::F>(Global::Dispatch, 5);
+    MotionSpan {
+        index: moving,
+        parameter: result,
+        rate: along.scale * loaded,
+    }
+}
+
+pub(crate) fn near_distance<M: Machine>(machine: &M, first: i32, j: u32) -> M::F {
+    const OF_KERNELS: [u8; 198] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => near_distance_of_near_frame(machine, at),
@@ -5237,15 +5746,27 @@ pub(crate) fn over<M: Machine>(machine: &M, a: [M::F; 4], b: [M::F; 4], t: M::F)
     }
 }
 
+/// The lowest 20 bits as a signed number of units.
+pub(crate) fn packed_component<M: Machine>(machine: &M, word: u32) -> M::F {
+    let _block = machine.block(line!(), 5);
+    M::F::of((((word << 12u32) as i32) >> 12u32) as f32) * M::F::of(PACKED_STEP)
+}
+
+pub(crate) fn parameter_in<M: Machine>(machine: &M, span: CrowdSpan<M::F>, tick: u32) -> M::F {
+    let _block = machine.block(line!(), 5);
+    let result = distance_from_middle(machine, (tick as i32).wrapping_sub(span.whole), 0u32);
+    result * span.scale + span.offset
+}
+
 pub(crate) fn parts_1<M: Machine>(machine: &M, rotation: [M::F; 4]) -> [M::F; 3] {
-    const OF_KERNELS: [u8; 194] = [
+    const OF_KERNELS: [u8; 198] = [
         0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 2, 0, 0, 0,
         0, 0, 1, 0, 2, 0, 0, 0, 0, 0, 1, 0, 2, 0, 0, 0, 0, 0, 1, 0, 2, 0, 0, 0, 0, 0, 1, 0, 0, 0,
         0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 2, 0, 0, 0, 0, 0, 1, 0,
         2, 0, 0, 0, 0, 0, 1, 0, 2, 0, 0, 0, 0, 0, 1, 0, 2, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0,
-        0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0,
-        0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0,
+        0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => parts_1_of_euler(machine, rotation),
@@ -5275,14 +5796,14 @@ pub(crate) fn parts_1_of_euler_2<M: Machine>(machine: &M, rotation: [M::F; 4]) -
 }
 
 pub(crate) fn parts_2<M: Machine>(machine: &M, rotation: [M::F; 4]) -> [M::F; 9] {
-    const OF_KERNELS: [u8; 194] = [
+    const OF_KERNELS: [u8; 198] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1,
         0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0,
         0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => parts_2_of_matrix3x3(machine, rotation),
@@ -5343,14 +5864,14 @@ pub(crate) fn parts_2_of_matrix3x3_2<M: Machine>(machine: &M, rotation: [M::F; 4
 }
 
 pub(crate) fn parts_3<M: Machine>(machine: &M, rotation: [M::F; 4]) -> [[M::F; 4]; 3] {
-    const OF_KERNELS: [u8; 194] = [
+    const OF_KERNELS: [u8; 198] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0,
         0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => parts_3_of_matrix3x4(machine, rotation),
@@ -5499,14 +6020,14 @@ pub(crate) fn polynomial<M: Machine>(machine: &M, c: [[M::F; 4]; 11], s: M::F) -
 }
 
 pub(crate) fn pose<M: Machine>(machine: &M, sample: u32) {
-    const OF_KERNELS: [u8; 194] = [
+    const OF_KERNELS: [u8; 198] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 2, 3,
         4, 5, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => pose_of_add(machine, sample),
@@ -5728,14 +6249,14 @@ pub(crate) fn pose_of_world<M: Machine>(machine: &M, sample: u32) {
 }
 
 pub(crate) fn position_at<M: Machine>(machine: &M, index: u32) -> CrowdPosition<M::F> {
-    const OF_KERNELS: [u8; 194] = [
+    const OF_KERNELS: [u8; 198] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 2, 2, 2, 2,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 2, 2, 2, 2,
     ];
     match OF_KERNELS[machine.code()] {
         0 => position_at_of_readers(machine, index),
@@ -5771,6 +6292,24 @@ pub(crate) fn position_at_of_readers_2<M: Machine>(machine: &M, index: u32) -> C
     CrowdPosition {
         span: pair[0],
         parameter: M::F::of_bits(pair[1]),
+    }
+}
+
+/// The position of a tick in a time base.
+pub(crate) fn position_in<M: Machine>(
+    machine: &M,
+    base: CrowdBase,
+    tick: u32,
+) -> CrowdPosition<M::F> {
+    let _block = machine.block(line!(), 8);
+    let index = span_at(machine, base, tick);
+    let span = machine
+        .load::<CrowdSpan<M::F>>(Global::Spans, 4 * (base.first.wrapping_add(index) as usize));
+    let is_key = span.start == tick | ON_KEY;
+    let result = parameter_in(machine, span, tick);
+    CrowdPosition {
+        span: index | (if is_key { ON_KEY } else { 0u32 }),
+        parameter: result,
     }
 }
 
@@ -5811,12 +6350,145 @@ pub(crate) fn remainder<M: Machine>(machine: &M, x: u32, q: u32) -> u32 {
     x.wrapping_sub(quotient(x, q).wrapping_mul(q))
 }
 
+/// x - (r + h)² for |h| of half a unit of the last place of r: its sign is exact.
+pub(crate) fn rest_of_square<M: Machine>(machine: &M, x: M::F, r: M::F, h: M::F) -> M::F {
+    let _block = machine.block(line!(), 16);
+    let high = M::F::of_bits(r.bits() & 0xfffff000u32);
+    let low = r - high;
+    let rest = ((x - high * high) - (M::F::of(2.0) * high) * low) - (M::F::of(2.0) * r) * h;
+    (rest - low * low) - h * h
+}
+
 pub(crate) fn root<M: Machine>(machine: &M, x: M::F) -> M::F {
     let _block = machine.block(line!(), 8);
     let result = reciprocal_root(machine, x);
     let near = x * result;
     let result_2 = reciprocal_root(machine, x);
     near + (x - near * near) * (M::F::of(0.5) * result_2)
+}
+
+/// Stores the rotation and the angular velocity about the parent's axes.
+pub(crate) fn rotate<M: Machine>(
+    machine: &M,
+    channel: CrowdChannel,
+    clip: CrowdClip,
+    tick: u32,
+    state: u32,
+) {
+    let mut rotation: [M::F; 4] = Default::default();
+    let mut curve: ValueAndSlope<M::F> = Default::default();
+    let mut arc: ArcSegment<M::F> = Default::default();
+    let mut velocity: [M::F; 4] = [M::F::of(0.0); 4];
+    let _block = machine.block(line!(), 22);
+    let base = machine.load::<CrowdBase>(
+        Global::TimeBases,
+        3 * (clip
+            .first_base
+            .wrapping_add(channel.form_and_base & 0xffffffu32) as usize),
+    );
+    let form = channel.form_and_base >> 24u32;
+    let position = position_in(machine, base, tick);
+    let span = position.span & TICKS;
+    let is_key = position.span & ON_KEY != 0u32;
+    let along = moving_span(machine, base, tick, span);
+    let loaded = machine.load::<u32>(Global::Dispatch, 4);
+    let moves = loaded != 0u32;
+    if (form == FORM_KEYS) | (form == FORM_PACKED) {
+        let _block = machine.block(line!(), 9);
+        if moves | !is_key {
+            let _block = machine.block(line!(), 4);
+            let result = key_of(machine, channel, along.index);
+            let result_2 = key_after(machine, channel, base, along.index);
+            let result_3 = arc_between(machine, result, result_2);
+            arc = result_3;
+        }
+        if is_key | (along.index != span) {
+            let _block = machine.block(line!(), 2);
+            let result_4 = key_of(machine, channel, span);
+            rotation = result_4;
+        } else {
+            let _block = machine.block(line!(), 4);
+            let loaded_2 = arc;
+            let result_5 = evaluate_arc_segment(machine, loaded_2, position.parameter);
+            let result_6 = canonical(machine, result_5);
+            rotation = result_6;
+        }
+        let loaded_3 = arc.middle;
+        let loaded_4 = arc.tangent;
+        curve = ValueAndSlope {
+            value: loaded_3,
+            slope: loaded_4,
+        };
+    } else {
+        let _block = machine.block(line!(), 5);
+        let result_7 = sampled(machine, channel, position);
+        rotation = result_7;
+        if moves & (form == FORM_ARC) {
+            let _block = machine.block(line!(), 7);
+            let first = channel
+                .first
+                .wrapping_add(along.index.wrapping_mul(channel.count).wrapping_mul(2u32));
+            let result_8 = cell_at(machine, first);
+            let result_9 = cell_at(machine, first.wrapping_add(channel.count));
+            curve = ValueAndSlope {
+                value: result_8,
+                slope: result_9,
+            };
+        } else {
+            let _block = machine.block(line!(), 3);
+            if moves & (form != FORM_CONSTANT) {
+                let _block = machine.block(line!(), 2);
+                let result_10 = value_and_slope(machine, channel, along, 11u32);
+                curve = result_10;
+            }
+        }
+    }
+    let loaded_5 = rotation;
+    machine.store::<[M::F; 4]>(
+        Global::States,
+        4 * (state.wrapping_add(LOCAL_ROTATION) as usize),
+        loaded_5,
+    );
+    let loaded_6 = rotation;
+    machine.store::<[M::F; 4]>(
+        Global::States,
+        4 * (state.wrapping_add(WORLD_ROTATION) as usize),
+        loaded_6,
+    );
+    if moves {
+        let _block = machine.block(line!(), 5);
+        if form != FORM_CONSTANT {
+            let _block = machine.block(line!(), 11);
+            let loaded_7 = curve.value;
+            let loaded_8 = curve.value[3];
+            let inverse = [
+                [loaded_7[0], loaded_7[1], loaded_7[2]].map(|x| -x)[0],
+                [loaded_7[0], loaded_7[1], loaded_7[2]].map(|x| -x)[1],
+                [loaded_7[0], loaded_7[1], loaded_7[2]].map(|x| -x)[2],
+                loaded_8,
+            ];
+            let loaded_9 = curve.slope;
+            let result_11 = product(machine, loaded_9, inverse);
+            let result_12 = canonical3(
+                machine,
+                both(
+                    [result_11[0], result_11[1], result_11[2]],
+                    [M::F::of(2.0) * along.rate; 3],
+                    |x, y| x * y,
+                ),
+            );
+            velocity = result_12;
+        }
+        let loaded_10 = velocity;
+        machine.store::<[M::F; 4]>(
+            Global::States,
+            4 * (state.wrapping_add(ANGULAR_VELOCITY) as usize),
+            loaded_10,
+        );
+        return;
+    } else {
+        return;
+    }
 }
 
 /// q v q*, for a unit quaternion.
@@ -6092,14 +6764,14 @@ pub(crate) fn row_product<M: Machine>(
 }
 
 pub(crate) fn sample_at_key_sample<M: Machine>(machine: &M, index: u32) -> KeySample<M::F> {
-    const OF_KERNELS: [u8; 194] = [
+    const OF_KERNELS: [u8; 198] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => sample_at_key_sample_of_readers(machine, index),
@@ -6134,14 +6806,14 @@ pub(crate) fn sample_at_key_sample_of_readers_2<M: Machine>(
 }
 
 pub(crate) fn sample_at_listed_sample<M: Machine>(machine: &M, index: u32) -> ListedSample<M::F> {
-    const OF_KERNELS: [u8; 194] = [
+    const OF_KERNELS: [u8; 198] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1,
-        1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => sample_at_listed_sample_of_readers(machine, index),
@@ -6321,14 +6993,14 @@ pub(crate) fn sampled<M: Machine>(
 }
 
 pub(crate) fn segment_at_arc_segment<M: Machine>(machine: &M, index: u32) -> ArcSegment<M::F> {
-    const OF_KERNELS: [u8; 194] = [
+    const OF_KERNELS: [u8; 198] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
-        1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1,
+        1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => segment_at_arc_segment_of_readers(machine, index),
@@ -6364,14 +7036,14 @@ pub(crate) fn segment_at_polynomial_segment<M: Machine>(
     machine: &M,
     index: u32,
 ) -> PolynomialSegment<M::F> {
-    const OF_KERNELS: [u8; 194] = [
+    const OF_KERNELS: [u8; 198] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
-        1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
+        1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => segment_at_polynomial_segment_of_readers(machine, index),
@@ -6926,14 +7598,14 @@ pub(crate) fn step_vector<M: Machine>(machine: &M, a: [M::F; 4], chord: [M::F; 4
 }
 
 pub(crate) fn store<M: Machine>(machine: &M, index: u32, rotation: [M::F; 4]) {
-    const OF_KERNELS: [u8; 194] = [
+    const OF_KERNELS: [u8; 198] = [
         0, 0, 1, 2, 3, 4, 5, 6, 1, 0, 1, 2, 3, 4, 5, 6, 1, 0, 1, 2, 3, 4, 5, 6, 1, 0, 1, 2, 3, 4,
         5, 6, 1, 0, 1, 2, 3, 4, 5, 6, 1, 0, 1, 2, 3, 4, 5, 6, 1, 0, 1, 2, 3, 4, 5, 6, 1, 0, 1, 2,
         3, 4, 5, 6, 1, 0, 1, 2, 3, 4, 5, 6, 1, 0, 1, 2, 3, 4, 5, 6, 1, 0, 1, 2, 3, 4, 5, 6, 1, 0,
         1, 2, 3, 4, 5, 6, 1, 0, 1, 2, 3, 4, 5, 6, 1, 0, 1, 2, 3, 4, 5, 6, 1, 3, 3, 3, 0, 0, 0, 0,
-        0, 0, 3, 3, 3, 3, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 3, 0, 0, 1, 2, 7, 4, 5, 6, 1, 0, 1, 2,
-        7, 4, 5, 6, 1, 0, 1, 2, 7, 4, 5, 6, 1, 0, 1, 2, 7, 4, 5, 6, 1, 0, 1, 2, 7, 4, 5, 6, 1, 0,
-        1, 2, 7, 4, 5, 6, 1, 7, 7, 7, 7, 7, 7, 7,
+        0, 0, 3, 3, 3, 3, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 3, 0, 0, 0, 0, 0, 0, 1, 2, 7, 4, 5, 6,
+        1, 0, 1, 2, 7, 4, 5, 6, 1, 0, 1, 2, 7, 4, 5, 6, 1, 0, 1, 2, 7, 4, 5, 6, 1, 0, 1, 2, 7, 4,
+        5, 6, 1, 0, 1, 2, 7, 4, 5, 6, 1, 7, 7, 7, 7, 7, 7, 7,
     ];
     match OF_KERNELS[machine.code()] {
         0 => store_of_axis_angle(machine, index, rotation),
@@ -7070,14 +7742,14 @@ pub(crate) fn store_with_care<M: Machine>(
     first_j: u32,
     repetition: u32,
 ) {
-    const OF_KERNELS: [u8; 194] = [
+    const OF_KERNELS: [u8; 198] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 1, 0, 1, 1, 0, 0, 1, 0, 1, 0, 1, 1, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => store_with_care_of_alone(machine, item, location, first_j, repetition),
@@ -7248,14 +7920,14 @@ pub(crate) fn store_with_care_of_alone_2<M: Machine>(
 }
 
 pub(crate) fn tick_of<M: Machine>(machine: &M, entry: CrowdEntry, period: u32) -> u32 {
-    const OF_KERNELS: [u8; 194] = [
+    const OF_KERNELS: [u8; 198] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => tick_of_of_ticks(machine, entry, period),
@@ -7554,6 +8226,114 @@ pub(crate) fn transform_row<M: Machine>(
     result
 }
 
+pub(crate) fn unpacked<M: Machine>(machine: &M, words: [u32; 2]) -> [M::F; 4] {
+    let _block = machine.block(line!(), 30);
+    let a = packed_component(machine, words[0]);
+    let b = packed_component(machine, (words[0] >> 20u32) | (words[1] << 12u32));
+    let c = packed_component(machine, words[1] >> 8u32);
+    let square = (a * a + b * b) + c * c;
+    let rest = M::F::of(1.0) - square;
+    let d = exact_root(
+        machine,
+        if rest < M::F::of(0.0) {
+            M::F::of(0.0)
+        } else {
+            rest
+        },
+    );
+    let largest = (words[1] >> 28u32) & 3u32;
+    let value = if largest >= 2u32 {
+        if largest == 3u32 {
+            [a, b, c, d]
+        } else {
+            [b, c, d, a]
+        }
+    } else {
+        if largest == 1u32 {
+            [c, d, a, b]
+        } else {
+            [d, a, b, c]
+        }
+    };
+    let is_negative = (words[1] >> 30u32) & 1u32 == 1u32;
+    let result = canonical(
+        machine,
+        if is_negative {
+            value.map(|x| -x)
+        } else {
+            value
+        },
+    );
+    result
+}
+
+/// The value of a curve of so many coefficients, or its derivative by its parameter.
+pub(crate) fn value_and_slope<M: Machine>(
+    machine: &M,
+    channel: CrowdChannel,
+    along: MotionSpan<M::F>,
+    coefficients: u32,
+) -> ValueAndSlope<M::F> {
+    let mut cell: u32 = Default::default();
+    let mut slope: [M::F; 4] = Default::default();
+    let mut value: [M::F; 4] = Default::default();
+    let mut power: u32 = Default::default();
+    let _block = machine.block(line!(), 23);
+    let first = channel.first.wrapping_add(
+        along
+            .index
+            .wrapping_mul(channel.count)
+            .wrapping_mul(coefficients),
+    );
+    cell = first.wrapping_add(coefficients.wrapping_sub(1u32).wrapping_mul(channel.count));
+    let loaded = cell;
+    let result = cell_at(machine, loaded);
+    slope = result;
+    let loaded_2 = cell;
+    cell = loaded_2.wrapping_sub(channel.count);
+    let loaded_3 = slope;
+    let loaded_4 = cell;
+    let result_2 = cell_at(machine, loaded_4);
+    value = both(
+        both(loaded_3, [along.parameter; 4], |x, y| x * y),
+        result_2,
+        |x, y| x + y,
+    );
+    power = coefficients.wrapping_sub(2u32);
+    loop {
+        let _block = machine.block(line!(), 20);
+        let loaded_5 = power;
+        if !(loaded_5 != 0u32) {
+            break;
+        }
+        let loaded_6 = slope;
+        let loaded_7 = value;
+        slope = both(
+            both(loaded_6, [along.parameter; 4], |x, y| x * y),
+            loaded_7,
+            |x, y| x + y,
+        );
+        let loaded_8 = cell;
+        cell = loaded_8.wrapping_sub(channel.count);
+        let loaded_9 = value;
+        let loaded_10 = cell;
+        let result_3 = cell_at(machine, loaded_10);
+        value = both(
+            both(loaded_9, [along.parameter; 4], |x, y| x * y),
+            result_3,
+            |x, y| x + y,
+        );
+        let loaded_11 = power;
+        power = loaded_11.wrapping_sub(1u32);
+    }
+    let loaded_12 = value;
+    let loaded_13 = slope;
+    ValueAndSlope {
+        value: loaded_12,
+        slope: loaded_13,
+    }
+}
+
 /// Makes the matrix of a joint one in the model, where its parent's is one.
 pub(crate) fn walk<M: Machine>(machine: &M, instance: u32, link: CrowdLink) {
     let _block = machine.block(line!(), 26);
@@ -7590,14 +8370,14 @@ pub(crate) fn walk<M: Machine>(machine: &M, instance: u32, link: CrowdLink) {
 }
 
 pub(crate) fn weights_at<M: Machine>(machine: &M, index: u32) -> TangentWeights<M::F> {
-    const OF_KERNELS: [u8; 194] = [
+    const OF_KERNELS: [u8; 198] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => weights_at_of_readers(machine, index),

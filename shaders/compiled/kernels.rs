@@ -1,5 +1,6 @@
 // Written by `cargo run -p tumble-shaders` from the shaders: change those.
 
+pub(crate) const ANGULAR_VELOCITY: u32 = 4;
 pub(crate) const ARC_0: f32 = -0.3333333;
 pub(crate) const ARC_1: f32 = 0.1999974;
 pub(crate) const ARC_2: f32 = -0.14278568;
@@ -63,6 +64,9 @@ pub(crate) const FLUSHED_BITS: u32 = 645922816;
 pub(crate) const FORM_ARC: u32 = 1;
 pub(crate) const FORM_CONSTANT: u32 = 0;
 pub(crate) const FORM_CUBIC: u32 = 2;
+pub(crate) const FORM_KEYS: u32 = 16;
+pub(crate) const FORM_LINE: u32 = 18;
+pub(crate) const FORM_PACKED: u32 = 17;
 pub(crate) const FORM_POLYNOMIAL: u32 = 3;
 pub(crate) const FROM_KEYS_WORKGROUP: u32 = 64;
 pub(crate) const GIMBAL: f32 = 2.5e-7;
@@ -82,6 +86,7 @@ pub(crate) const LEAST_NORMAL: u32 = 947912704;
 pub(crate) const LEAST_SQUARED_SUM: f32 = 9.094947e-13;
 pub(crate) const LINE: u32 = 8;
 pub(crate) const LINE_VECTORS: u32 = 8;
+pub(crate) const LOCAL_ROTATION: u32 = 0;
 pub(crate) const LOG_1: f32 = 0.16666667;
 pub(crate) const LOG_2: f32 = 0.075;
 pub(crate) const LOG_3: f32 = 0.04464286;
@@ -95,13 +100,16 @@ pub(crate) const MAX_WALKED: u32 = 128;
 pub(crate) const MAX_WHOLE_JOINTS: u32 = 128;
 pub(crate) const MAX_WHOLE_POSITIONS: u32 = 128;
 pub(crate) const MAY_BE_TINY: u32 = 1073741824;
+pub(crate) const MOTION_WORKGROUP: u32 = 64;
 pub(crate) const NEEDS_CARE: u32 = 1073741824;
 pub(crate) const NEGATIVE: u32 = 128;
 pub(crate) const NO_KEY: u32 = 4294967295;
 pub(crate) const ON_KEY: u32 = 2147483648;
+pub(crate) const PACKED_STEP: f32 = 1.3487017e-6;
 pub(crate) const PI: f32 = 3.1415927;
 pub(crate) const PI_LOW: f32 = -8.742278e-8;
 pub(crate) const POSE_WORKGROUP: u32 = 64;
+pub(crate) const POSITION: u32 = 2;
 pub(crate) const PREPARE_WORKGROUP: u32 = 64;
 pub(crate) const QUARTER_COSINE_2: f32 = -0.5;
 pub(crate) const QUARTER_COSINE_4: f32 = 0.041666646;
@@ -149,14 +157,17 @@ pub(crate) const SPEED_MAGNITUDE: u32 = 8388607;
 pub(crate) const SPREAD_WORKGROUP: u32 = 128;
 pub(crate) const START_BIAS: u32 = 131072;
 pub(crate) const START_NEGATED: u32 = 1073741824;
+pub(crate) const STATE_VECTORS: u32 = 5;
 pub(crate) const SYMMETRIC: u32 = 64;
 pub(crate) const THIRD: f32 = 0.33333334;
 pub(crate) const TICKS: u32 = 2147483647;
 pub(crate) const TINY_BITS: u32 = 528482304;
 pub(crate) const TRANSLATION: u32 = 1;
 pub(crate) const TWO_THIRDS: f32 = 0.6666667;
+pub(crate) const VELOCITY: u32 = 3;
 pub(crate) const WEIGHT_UNIT: f32 = 3.0517578e-5;
 pub(crate) const WORKGROUP: u32 = 64;
+pub(crate) const WORLD_ROTATION: u32 = 1;
 pub(crate) const WRAP_HOLD: u32 = 0;
 pub(crate) const WRAP_LOOP: u32 = 1;
 pub(crate) const WRAP_MIRROR: u32 = 2;
@@ -578,6 +589,49 @@ const _: () = {
 };
 #[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
+pub(crate) struct MotionDispatch {
+/// The number of invocations with work.
+    pub(crate) count: u32,
+/// The first sample of the window.
+    pub(crate) first_sample: u32,
+/// Joints of the skeleton.
+    pub(crate) joints: u32,
+/// Joints that have a parent.
+    pub(crate) links: u32,
+/// 1 where velocities are derivatives of the curves, else 0.
+    pub(crate) moves: u32,
+/// Ticks in a second.
+    pub(crate) ticks_per_second: f32,
+/// The vector of each joint's state that is stored.
+    pub(crate) vector: u32,
+/// How many numbers of it are stored.
+    pub(crate) numbers: u32,
+}
+const _: () = {
+    assert!(size_of::<MotionDispatch>() == 32);
+    assert!(std::mem::offset_of!(MotionDispatch, count) == 0);
+    assert!(std::mem::offset_of!(MotionDispatch, first_sample) == 4);
+    assert!(std::mem::offset_of!(MotionDispatch, joints) == 8);
+    assert!(std::mem::offset_of!(MotionDispatch, links) == 12);
+    assert!(std::mem::offset_of!(MotionDispatch, moves) == 16);
+    assert!(std::mem::offset_of!(MotionDispatch, ticks_per_second) == 20);
+    assert!(std::mem::offset_of!(MotionDispatch, vector) == 24);
+    assert!(std::mem::offset_of!(MotionDispatch, numbers) == 28);
+};
+/// A clip and the tick at which it is sampled.
+#[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub(crate) struct MotionSample {
+    pub(crate) clip: u32,
+    pub(crate) tick: u32,
+}
+const _: () = {
+    assert!(size_of::<MotionSample>() == 8);
+    assert!(std::mem::offset_of!(MotionSample, clip) == 0);
+    assert!(std::mem::offset_of!(MotionSample, tick) == 4);
+};
+#[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
 pub(crate) struct PolynomialSegment {
 /// The coefficients of 1, s, s², … s¹⁰.
     pub(crate) coefficients: [[f32; 4]; 11],
@@ -917,6 +971,10 @@ pub(crate) enum Kernel {
     CrowdWholeMatrices,
     CrowdPlainWholeMatrices,
     CrowdSubgroupRotations,
+    MotionJoints,
+    MotionWalk,
+    MotionDifferences,
+    MotionStore,
     PrepareArcs,
 }
 /// How the work over segments is listed.
@@ -1061,10 +1119,10 @@ impl Kernel {
         }
     }
 }
-pub(crate) static KERNELS: [KernelCode; 139] = [
-    KernelCode { kernel: Kernel::SelfTest, storage: ("self_test", 1946), texels: None, converting: None, bindings: &[Read, Write], segments: None, subgroups: false },
-    KernelCode { kernel: Kernel::ArcFramesAxisAngle, storage: ("arc_frames_axis_angle", 2963), texels: Some(("arc_frames_axis_angle_texels", 3089)), converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::Frames, Store::AxisAngle)), subgroups: false },
-    KernelCode { kernel: Kernel::ArcFramesEuler, storage: ("arc_frames_euler", 3619), texels: Some(("arc_frames_euler_texels", 3737)), converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::Frames, Store::Euler)), subgroups: false },
+pub(crate) static KERNELS: [KernelCode; 143] = [
+    KernelCode { kernel: Kernel::SelfTest, storage: ("self_test", 1920), texels: None, converting: None, bindings: &[Read, Write], segments: None, subgroups: false },
+    KernelCode { kernel: Kernel::ArcFramesAxisAngle, storage: ("arc_frames_axis_angle", 2937), texels: Some(("arc_frames_axis_angle_texels", 3063)), converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::Frames, Store::AxisAngle)), subgroups: false },
+    KernelCode { kernel: Kernel::ArcFramesEuler, storage: ("arc_frames_euler", 3598), texels: Some(("arc_frames_euler_texels", 3716)), converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::Frames, Store::Euler)), subgroups: false },
     KernelCode { kernel: Kernel::ArcFramesF16, storage: ("arc_frames_f16", 2176), texels: Some(("arc_frames_f16_texels", 2294)), converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::Frames, Store::F16)), subgroups: false },
     KernelCode { kernel: Kernel::ArcFramesF32, storage: ("arc_frames_f32", 1920), texels: Some(("arc_frames_f32_texels", 2151)), converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::Frames, Store::F32)), subgroups: false },
     KernelCode { kernel: Kernel::ArcFramesMatrix3x3, storage: ("arc_frames_matrix3x3", 2604), texels: Some(("arc_frames_matrix3x3_texels", 2722)), converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::Frames, Store::Matrix3x3)), subgroups: false },
@@ -1200,5 +1258,9 @@ pub(crate) static KERNELS: [KernelCode; 139] = [
     KernelCode { kernel: Kernel::CrowdWholeMatrices, storage: ("crowd_whole_matrices", 10274), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Read, Read, Read, Read, Write, Write], segments: None, subgroups: false },
     KernelCode { kernel: Kernel::CrowdPlainWholeMatrices, storage: ("crowd_plain_whole_matrices", 6928), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Read, Read, Read, Read, Write, Write], segments: None, subgroups: false },
     KernelCode { kernel: Kernel::CrowdSubgroupRotations, storage: ("crowd_subgroup_rotations", 4532), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Read, Read, Write], segments: None, subgroups: true },
+    KernelCode { kernel: Kernel::MotionJoints, storage: ("motion_joints", 8574), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Read, Read, Write], segments: None, subgroups: false },
+    KernelCode { kernel: Kernel::MotionWalk, storage: ("motion_walk", 3886), texels: None, converting: None, bindings: &[Read, ReadWrite], segments: None, subgroups: false },
+    KernelCode { kernel: Kernel::MotionDifferences, storage: ("motion_differences", 3553), texels: None, converting: None, bindings: &[Read, ReadWrite], segments: None, subgroups: false },
+    KernelCode { kernel: Kernel::MotionStore, storage: ("motion_store", 625), texels: None, converting: None, bindings: &[Read, Write], segments: None, subgroups: false },
     KernelCode { kernel: Kernel::PrepareArcs, storage: ("prepare_arcs", 1870), texels: None, converting: None, bindings: &[Read, Read, Write], segments: None, subgroups: false },
 ];

@@ -1268,6 +1268,19 @@ class Motions:
         frames: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None,
     ) -> None: ...
 
+class DeviceMotions:
+    def __new__(cls, motions: Motions, engine: Engine) -> DeviceMotions: ...
+    @property
+    def nbytes(self) -> int: ...
+    def sample(
+        self,
+        clip_ids: NDArray[np.int64],
+        times: NDArray[np.float64],
+        shape: Sequence[int],
+        names: Sequence[str],
+        frames: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None,
+    ) -> list[DeviceArray]: ...
+
 _Six: TypeAlias = Literal["six-columns", "six-rows", "six-interleaved"]
 _Axis: TypeAlias = Literal["x", "y", "z"]
 _Ground: TypeAlias = Literal["y", "z"]

@@ -3,6 +3,7 @@
 
 mod crowd;
 mod from_keys;
+mod motion;
 pub(crate) mod passes;
 mod poses;
 pub(crate) mod random;
@@ -134,6 +135,10 @@ pub(crate) fn trials(kernel: Kernel, random: &mut Random) -> Vec<Trial> {
         | Kernel::CrowdWholeMatrices
         | Kernel::CrowdPlainWholeMatrices
         | Kernel::CrowdSubgroupRotations => whole_instances::trials(kernel, random),
+        Kernel::MotionJoints
+        | Kernel::MotionWalk
+        | Kernel::MotionDifferences
+        | Kernel::MotionStore => motion::trials(kernel, random),
         _ => segments::trials(kernel, random),
     }
 }

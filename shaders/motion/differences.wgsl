@@ -1,0 +1,25 @@
+// Sets a joint's velocities to the differences between two states of it.
+// Twin: src/crowd/states.rs.
+
+// Steps in a second, of each instance.
+@group(0) @binding(0) var<storage, read> rates: array<f32>;
+// [state][instance][joint][vector]: the state itself, the one before and the one after.
+@group(0) @binding(1) var<storage, read_write> states: array<vec4f>;
+
+fn motion_work(index: u32) {
+    let rate = rates[dispatch.first_sample + index / dispatch.joints];
+    let before = (dispatch.count + index) * STATE_VECTORS;
+    let after = (2u * dispatch.count + index) * STATE_VECTORS;
+    let state = index * STATE_VECTORS;
+    let moved = states[after + POSITION].xyz - states[before + POSITION].xyz;
+    states[state + VELOCITY] = canonical3(moved * rate);
+    let start = states[before + WORLD_ROTATION];
+    let turned = flushed4(product(states[after + WORLD_ROTATION], vec4f(-start.xyz, start.w)));
+    let sine = root(turned.x * turned.x + turned.y * turned.y + turned.z * turned.z);
+    // The shorter arc; the limit if the angle is 0.
+    let angle = 2.0 * arc_tangent(sine, magnitude(turned.w));
+    let divisor = select(sine, 1.0, sine == 0.0);
+    let along = select(angle * reciprocal(divisor), 2.0, sine == 0.0);
+    let scale = select(along, -along, turned.w < 0.0);
+    states[state + ANGULAR_VELOCITY] = canonical3(turned.xyz * (scale * rate));
+}
