@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use numpy::{PyArrayMethods, PyReadonlyArray1};
+use numpy::PyReadonlyArray1;
 use pyo3::prelude::*;
 use tumble::crowd::{FrameStep, StateArray};
 use tumble::vulkan::{ExportedResult, VulkanError};

@@ -2178,10 +2178,10 @@ pub(crate) fn hang_on<M: Machine>(machine: &M, parent: u32, child: u32) {
             Global::States,
             4 * (parent.wrapping_add(ANGULAR_VELOCITY) as usize),
         );
-        let turning = [loaded_5[0], loaded_5[1], loaded_5[2]];
+        let angular_above = [loaded_5[0], loaded_5[1], loaded_5[2]];
         let loaded_6 =
             machine.load::<[M::F; 4]>(Global::States, 4 * (parent.wrapping_add(VELOCITY) as usize));
-        let result_4 = cross3(machine, turning, arm);
+        let result_4 = cross3(machine, angular_above, arm);
         let carried = both([loaded_6[0], loaded_6[1], loaded_6[2]], result_4, |x, y| {
             x + y
         });
@@ -2199,7 +2199,7 @@ pub(crate) fn hang_on<M: Machine>(machine: &M, parent: u32, child: u32) {
             4 * (child.wrapping_add(ANGULAR_VELOCITY) as usize),
         );
         let angular = rotated(machine, above, [loaded_8[0], loaded_8[1], loaded_8[2]]);
-        let result_6 = canonical3(machine, both(turning, angular, |x, y| x + y));
+        let result_6 = canonical3(machine, both(angular_above, angular, |x, y| x + y));
         machine.store::<[M::F; 4]>(
             Global::States,
             4 * (child.wrapping_add(ANGULAR_VELOCITY) as usize),
@@ -5436,7 +5436,8 @@ pub(crate) fn motion_work_of_walk<M: Machine>(machine: &M, index: u32) {
 }
 
 pub(crate) fn motion_work_of_differences<M: Machine>(machine: &M, index: u32) {
-    let _block = machine.block(line!(), 56);
+    let mut along: M::F = M::F::of(0.0);
+    let _block = machine.block(line!(), 51);
     let loaded = machine.load::<u32>(Global::Dispatch, 1);
     let loaded_2 = machine.load::<u32>(Global::Dispatch, 2);
     let rate = machine.load::<M::F>(
@@ -5484,34 +5485,29 @@ pub(crate) fn motion_work_of_differences<M: Machine>(machine: &M, index: u32) {
             start[3],
         ],
     );
-    let turned = flushed4(machine, result_2);
+    let rotation = flushed4(machine, result_2);
     let sine = root(
         machine,
-        (turned[0] * turned[0] + turned[1] * turned[1]) + turned[2] * turned[2],
+        (rotation[0] * rotation[0] + rotation[1] * rotation[1]) + rotation[2] * rotation[2],
     );
-    let result_3 = magnitude(machine, turned[3]);
-    let result_4 = arc_tangent(machine, sine, result_3);
-    let angle = M::F::of(2.0) * result_4;
-    let divisor = if sine == M::F::of(0.0) {
-        M::F::of(1.0)
+    if sine != M::F::of(0.0) {
+        let _block = machine.block(line!(), 6);
+        let result_3 = magnitude(machine, rotation[3]);
+        let result_4 = arc_tangent(machine, sine, result_3);
+        let result_5 = reciprocal(machine, sine);
+        along = (M::F::of(2.0) * result_4) * result_5;
+    }
+    let loaded_8 = along;
+    let loaded_9 = along;
+    let scale = if rotation[3] < M::F::of(0.0) {
+        -loaded_9
     } else {
-        sine
-    };
-    let result_5 = reciprocal(machine, divisor);
-    let along = if sine == M::F::of(0.0) {
-        M::F::of(2.0)
-    } else {
-        angle * result_5
-    };
-    let scale = if turned[3] < M::F::of(0.0) {
-        -along
-    } else {
-        along
+        loaded_8
     };
     let result_6 = canonical3(
         machine,
         both(
-            [turned[0], turned[1], turned[2]],
+            [rotation[0], rotation[1], rotation[2]],
             [scale * rate; 3],
             |x, y| x * y,
         ),

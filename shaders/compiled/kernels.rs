@@ -1260,7 +1260,7 @@ pub(crate) static KERNELS: [KernelCode; 143] = [
     KernelCode { kernel: Kernel::CrowdSubgroupRotations, storage: ("crowd_subgroup_rotations", 4532), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Read, Read, Write], segments: None, subgroups: true },
     KernelCode { kernel: Kernel::MotionJoints, storage: ("motion_joints", 8574), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Read, Read, Write], segments: None, subgroups: false },
     KernelCode { kernel: Kernel::MotionWalk, storage: ("motion_walk", 3886), texels: None, converting: None, bindings: &[Read, ReadWrite], segments: None, subgroups: false },
-    KernelCode { kernel: Kernel::MotionDifferences, storage: ("motion_differences", 3553), texels: None, converting: None, bindings: &[Read, ReadWrite], segments: None, subgroups: false },
+    KernelCode { kernel: Kernel::MotionDifferences, storage: ("motion_differences", 3569), texels: None, converting: None, bindings: &[Read, ReadWrite], segments: None, subgroups: false },
     KernelCode { kernel: Kernel::MotionStore, storage: ("motion_store", 625), texels: None, converting: None, bindings: &[Read, Write], segments: None, subgroups: false },
     KernelCode { kernel: Kernel::PrepareArcs, storage: ("prepare_arcs", 1870), texels: None, converting: None, bindings: &[Read, Read, Write], segments: None, subgroups: false },
 ];

@@ -14,12 +14,13 @@ fn motion_work(index: u32) {
     let moved = states[after + POSITION].xyz - states[before + POSITION].xyz;
     states[state + VELOCITY] = canonical3(moved * rate);
     let start = states[before + WORLD_ROTATION];
-    let turned = flushed4(product(states[after + WORLD_ROTATION], vec4f(-start.xyz, start.w)));
-    let sine = root(turned.x * turned.x + turned.y * turned.y + turned.z * turned.z);
-    // The shorter arc; the limit if the angle is 0.
-    let angle = 2.0 * arc_tangent(sine, magnitude(turned.w));
-    let divisor = select(sine, 1.0, sine == 0.0);
-    let along = select(angle * reciprocal(divisor), 2.0, sine == 0.0);
-    let scale = select(along, -along, turned.w < 0.0);
-    states[state + ANGULAR_VELOCITY] = canonical3(turned.xyz * (scale * rate));
+    let rotation = flushed4(product(states[after + WORLD_ROTATION], vec4f(-start.xyz, start.w)));
+    let sine = root(rotation.x * rotation.x + rotation.y * rotation.y + rotation.z * rotation.z);
+    // The shorter arc, by the rotation vector's length; 0 if the angle is.
+    var along = 0.0;
+    if sine != 0.0 {
+        along = 2.0 * arc_tangent(sine, magnitude(rotation.w)) * reciprocal(sine);
+    }
+    let scale = select(along, -along, rotation.w < 0.0);
+    states[state + ANGULAR_VELOCITY] = canonical3(rotation.xyz * (scale * rate));
 }

@@ -1,7 +1,7 @@
 // Packed keys of rotations: three components in 20 bits each, which of the four is left out, and the sign.
 // Twin: src/crowd/clip_keys.rs.
 
-// What one unit of a packed component is.
+// One unit of a packed component.
 const PACKED_STEP: f32 = 1.34870174e-6;
 
 fn unpacked(words: vec2u) -> vec4f {

@@ -23,11 +23,11 @@ fn hang_on(parent: u32, child: u32) {
     let scale = 1.5 - 0.5 * dot4(rotation, rotation);
     states[child + WORLD_ROTATION] = canonical(rotation * scale);
     if dispatch.moves != 0u {
-        let turning = states[parent + ANGULAR_VELOCITY].xyz;
-        let carried = states[parent + VELOCITY].xyz + cross3(turning, arm);
+        let angular_above = states[parent + ANGULAR_VELOCITY].xyz;
+        let carried = states[parent + VELOCITY].xyz + cross3(angular_above, arm);
         let velocity = rotated(above, states[child + VELOCITY].xyz);
         states[child + VELOCITY] = canonical3(carried + velocity);
         let angular = rotated(above, states[child + ANGULAR_VELOCITY].xyz);
-        states[child + ANGULAR_VELOCITY] = canonical3(turning + angular);
+        states[child + ANGULAR_VELOCITY] = canonical3(angular_above + angular);
     }
 }

@@ -1,7 +1,7 @@
 //! Curves of motion tables that are kept as their keys, where these determine them: the arcs of slerp and straight
 //! lines. What a sample needs of them is computed when it is taken, so that a key takes 16 bytes instead of 48 for
 //! rotations, 16 instead of 80 for translations, and 8 if rotations are packed. Of the kernels those over states alone read
-//! these forms (`shaders/motion/joints.wgsl`); a crowd's do not.
+//! these forms (`shaders/motion/joints.wgsl`, with `shaders/motion/packed.wgsl`); a crowd's do not.
 
 use glam::Vec4;
 
@@ -124,7 +124,7 @@ fn next(index: usize, count: usize) -> usize {
 
 /// The middle of a line, and its rise.
 #[inline(always)]
-fn line_between(from: [f32; 4], to: [f32; 4]) -> [[f32; 4]; 2] {
+pub(crate) fn line_between(from: [f32; 4], to: [f32; 4]) -> [[f32; 4]; 2] {
     let [from, to] = [from, to].map(|key| key.map(f64::from));
     [
         std::array::from_fn(|c| round_f32((from[c] + to[c]) * 0.5)),
@@ -161,7 +161,7 @@ fn packed(key: [f32; 4]) -> [f32; 4] {
 
 /// The rotation that [`packed`] stored.
 #[inline(always)]
-fn unpacked([low, high]: [u32; 2]) -> [f32; 4] {
+pub(crate) fn unpacked([low, high]: [u32; 2]) -> [f32; 4] {
     let field = |bits: u32| ((bits << 12) as i32 >> 12) as f32 * PACKED_STEP;
     let (a, b, c) = (field(low), field(low >> 20 | high << 12), field(high >> 8));
     let square = a * a + b * b + c * c;

@@ -1,6 +1,7 @@
 //! States of a library's clips at any times: rotations, positions and velocities of all joints, for the training of
 //! models of motion. The rotations have a crowd's bits. The rest is computed from them with sums and products alone,
-//! so that every machine has the same bits. Twin of `shaders/motion/`.
+//! so that every machine has the same bits. Twin of `shaders/motion/joints.wgsl`,
+//! `shaders/motion/walk.wgsl` and `shaders/motion/differences.wgsl`.
 
 use std::ops::Range;
 
@@ -419,6 +420,8 @@ struct StateScratch {
 /// Scratch memory for one pose.
 #[derive(Default)]
 struct PoseScratch {
+    /// The clip of the previous pose, and the positions of its time bases.
+    clip: Option<u32>,
     positions: Vec<CrowdPosition>,
     /// The keys at the start and at the end of the span of each joint.
     keys: [Vec<[f32; 4]>; 2],
@@ -554,9 +557,20 @@ impl Poses<'_> {
         let tick = tick.min(clip_entry.period);
         let bases = &tables.bases[clip_entry.first_base as usize..][..clip_entry.bases as usize];
         let positions = &mut scratch.positions;
-        positions.clear();
-        let position = |base| guessed_position(base, spans, tick, clip_entry.period);
-        positions.extend(bases.iter().map(position));
+        if scratch.clip != Some(clip) {
+            scratch.clip = Some(clip);
+            positions.clear();
+            // As if keys were at even times.
+            positions.extend(bases.iter().map(|base| CrowdPosition {
+                span: spans_in(base, tick.into(), clip_entry.period) as u32,
+                parameter: 0.0,
+            }));
+        }
+        // The previous pose of a clip is often a frame away: of a window, or an end of a step.
+        for (base, position) in bases.iter().zip(&mut *positions) {
+            let guess = position.span & TICKS;
+            *position = guessed_position(base, spans, (tick, clip_entry.period), guess);
+        }
         let each = tables.joints * CHANNELS as usize;
         let channels = &tables.channels[clip as usize * each..][..each];
         let moment = ClipMoment {
@@ -639,38 +653,38 @@ impl Joint {
         let [x, y, z, w] = before.rotation;
         let [x, y, z, w] = product(after.rotation, [-x, -y, -z, w]).map(flushed);
         let sine = root(x * x + y * y + z * z);
-        // The shorter arc; the limit if the angle is 0.
-        let angle = 2.0 * arc_tangent(sine, w.abs());
+        // The shorter arc, by the rotation vector's length; 0 if the angle is.
         let scale = match sine == 0.0 {
-            true => 2.0,
-            false => angle * reciprocal(sine),
+            true => 0.0,
+            false => 2.0 * arc_tangent(sine, w.abs()) * reciprocal(sine),
         };
         let scale = if w < 0.0 { -scale } else { scale };
         self.angular_velocity = scaled([x, y, z], scale * per_second).map(canonical);
     }
 }
 
+/// The spans of a time base in so many ticks if keys are at even times, rounded towards 0.
+#[inline(always)]
+fn spans_in(base: &CrowdBase, ticks: i64, period: u32) -> i64 {
+    let count = i64::from(base.count);
+    (ticks * (count - 1) / i64::from(period).max(1)).min(count - 1)
+}
+
 /// The position of a tick in a time base, as [`position_at`] computes it. Most keys are at even times, or intervals are
-/// divided about evenly. Therefore the span that would contain the tick at even times is tried first, and then those to
-/// which the distance from it points. A search from the ends would wait for memory at each step.
+/// divided about evenly. Therefore a guessed span is tried first, and then those to which the distance from it points. A
+/// search from the ends would wait for memory at each step.
 #[inline(always)]
 fn guessed_position(
     base: &CrowdBase,
     spans: &[CrowdSpan],
-    tick: u32,
-    period: u32,
+    (tick, period): (u32, u32),
+    guess: u32,
 ) -> CrowdPosition {
     let count = i64::from(base.count);
     let base_spans = &spans[base.first as usize..][..base.count as usize];
     let start = |index: i64| i64::from(base_spans[index as usize].start & TICKS);
-    // The number of spans in this many ticks, rounded away from 0.
-    let spans_in = |ticks: i64| {
-        let product = ticks * (count - 1);
-        let period = i64::from(period).max(1);
-        (product + product.signum() * (period - 1)) / period
-    };
     let tick_number = i64::from(tick);
-    let mut index = (tick_number * (count - 1) / i64::from(period).max(1)).min(count - 1);
+    let mut index = i64::from(guess).min(count - 1);
     for _ in 0..GUESSES {
         let distance = tick_number - start(index);
         let is_before_next = index + 1 == count || tick_number < start(index + 1);
@@ -684,9 +698,10 @@ fn guessed_position(
             let span = position.span + index as u32;
             return CrowdPosition { span, ..position };
         }
+        // At least one span on.
         index = match distance < 0 {
-            true => (index + spans_in(distance)).max(0),
-            false => (index + spans_in(distance)).min(count - 1),
+            true => (index + spans_in(base, distance, period) - 1).max(0),
+            false => (index + spans_in(base, distance, period).max(1)).min(count - 1),
         };
     }
     position_at(base, spans, tick)

@@ -190,6 +190,7 @@ impl ResidentMotions {
         &self,
         request: &StatesRequest<'_>,
     ) -> Result<(ExportedResult, Vec<Range<u64>>), EvaluateError> {
+        self.engine.device.check_process()?;
         let ranges = self.ranges(request);
         let bytes = ranges.last().map_or(0, |range| range.end);
         let exported = self.engine.exported(bytes)?;
@@ -202,6 +203,7 @@ impl ResidentMotions {
         &self,
         request: &StatesRequest<'_>,
     ) -> Result<(MappedStates, Vec<Range<u64>>), EvaluateError> {
+        self.engine.device.check_process()?;
         let ranges = self.ranges(request);
         let bytes = ranges.last().map_or(0, |range| range.end);
         let is_in_place = self.engine.device.placing.in_place;
@@ -241,7 +243,6 @@ impl ResidentMotions {
         target: StatesTarget<'_>,
     ) -> Result<(), EvaluateError> {
         let device = &self.engine.device;
-        device.check_process()?;
         if request.at.is_empty() || request.arrays.is_empty() {
             return Ok(());
         }

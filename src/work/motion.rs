@@ -7,7 +7,7 @@ use crate::output::states::StateArray;
 use crate::shader::{Kernel, MOTION_WORKGROUP, MotionDispatch, STATE_VECTORS, WORKGROUP};
 use crate::work::recording::{Recording, Resource, Set, workgroups};
 
-/// What is computed of each instance.
+/// The values that are computed of each instance.
 #[derive(Clone, Copy)]
 pub(crate) struct StatesShape<'a> {
     /// Joints of the skeleton.

@@ -102,7 +102,7 @@ class MotionState(_WithWeakReferences[_A]):
 
 if TYPE_CHECKING:
     _S = TypeVar("_S", bound=MotionState[Any])
-    _Device: TypeAlias = str | Engine
+    _Device: TypeAlias = str | int | Engine
     _Array: TypeAlias = NDArray[np.float32]
     _Representation: TypeAlias = Literal["quaternion", "matrix", "6d", "rotvec"]
     _Order: TypeAlias = Literal["xyzw", "wxyz"]
@@ -370,7 +370,7 @@ class MotionLibrary(Generic[_A]):
         self._device: Engine | None = None
         if device is None or (isinstance(device, str) and device.lower() == "cpu"):
             return
-        self._device = Engine(device) if isinstance(device, str) else device
+        self._device = device if isinstance(device, Engine) else Engine(device)
         self._on_device = DeviceMotions(self._motions, self._device)
 
     @property

@@ -18,6 +18,7 @@ __all__ = [
     "ClipDifference",
     "Crowd",
     "DeviceArray",
+    "DeviceMotions",
     "Engine",
     "File",
     "JointDifference",
@@ -1268,6 +1269,7 @@ class Motions:
         frames: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None,
     ) -> None: ...
 
+@final
 class DeviceMotions:
     def __new__(cls, motions: Motions, engine: Engine) -> DeviceMotions: ...
     @property
