@@ -908,7 +908,7 @@ fn roots_stay_in_place_or_are_carried() {
         ),
         (
             "--root-motion in-place --quantity scalars -o a.csv",
-            "--root-motion is for files of whole clips",
+            "--root-motion changes translations as well as rotations",
         ),
         (
             "--root-motion extract --dialect mjlab --fps 50 -o a.npz",
