@@ -131,7 +131,7 @@ fn every_trajectory_becomes_every_other() {
         Some("0.05")
     );
 
-    refused(at, "convert path.tum -o uneven.kitti", "give --times-out");
+    refused(at, "convert path.tum -o uneven.kitti", "with --times-out");
     refused(
         at,
         "convert path.tum -o other.tum --times-out t.txt",
