@@ -332,6 +332,8 @@ functions! { on, r:
     "reciprocal" of r.positive() => |x| entries::reciprocal(on, x), cpu::reciprocal(x);
     "reciprocal_root" of r.positive() => |x| entries::reciprocal_root(on, x), cpu::reciprocal_root(x);
     "root" of r.positive() => |x| entries::root(on, x), root(x);
+    "acute_arc_tangent" of (r.positive(), r.positive()) => |(y, x)|
+        entries::acute_arc_tangent(on, y, x), cpu::acute_arc_tangent(y, x);
     "arc_tangent" of (r.finite(), r.finite()) => |(y, x)| entries::arc_tangent(on, y, x), arc_tangent(y, x);
     "sine_cosine" of angle(r) => |x| entries::sine_cosine(on, x), <[f32; 2]>::from(cpu::sine_cosine(x));
     "sine_cosm1" of (angle(r), r.positive()) => |(x, z)|

@@ -713,10 +713,10 @@ fn a_wave_executes_few_operations_for_a_rotation() {
         (even, 40, by_track, 16, [68.1, 75.8]),
         (even, 40, by_track, 48, [60.2, 66.2]),
         (even, 40, by_track, 192, [47.1, 49.9]),
-        (even, 64, by_frame, 8, [46.3, 51.1]),
-        (even, 64, by_frame, 48, [49.0, 54.0]),
-        (uneven, 64, by_frame, 8, [119.0, 112.0]),
-        (uneven, 64, by_frame, 48, [124.0, 115.0]),
+        (even, 64, by_frame, 8, [45.3, 49.4]),
+        (even, 64, by_frame, 48, [48.0, 52.3]),
+        (uneven, 64, by_frame, 8, [118.0, 110.0]),
+        (uneven, 64, by_frame, 48, [123.0, 114.0]),
     ];
     let mut wrong = Vec::new();
     for (workload, tracks, (layout, angle), step, counted) in workloads {
