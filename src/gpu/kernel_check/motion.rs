@@ -52,6 +52,8 @@ fn arguments(count: u32, moves: u32) -> MotionDispatch {
 /// Two clips with a time base for rotations and one for the rest; channels of all forms.
 fn joints(random: &mut Random, moves: u32) -> Trial {
     const FIRST: u32 = 3;
+    /// Channels that lie side by side.
+    const COUNT: u32 = 2;
     let period = (SPANS - 1) * TICKS_OF_SPAN;
     let clip = |clip: u32| CrowdClip {
         period,
@@ -83,7 +85,6 @@ fn joints(random: &mut Random, moves: u32) -> Trial {
         }
     };
     // Rotations for all forms: those of a curve have the room of polynomials.
-    const COUNT: u32 = 2;
     let room = SPANS * COUNT * POWERS as u32;
     let cells: Vec<[f32; 4]> = (0..room + 4).map(|_| random.rotation()).collect();
     let channel = |random: &mut Random, kind: u32| {
