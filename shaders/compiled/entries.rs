@@ -792,6 +792,34 @@ pub(crate) struct ValueAndSlope<F> {
 
 stored!(ValueAndSlope, (<F>), 8, value 0, slope 4);
 
+/// The angle of the point (along, up), neither of which is negative, from 0 to pi/2; 0 for (0, 0).
+pub(crate) fn acute_arc_tangent<M: Machine>(machine: &M, up: M::F, along: M::F) -> M::F {
+    let _block = machine.block(line!(), 34);
+    let steep = up > along;
+    let large = if steep { up } else { along };
+    let small = if steep { along } else { up };
+    let divisor = if large == M::F::of(0.0) {
+        M::F::of(1.0)
+    } else {
+        large
+    };
+    let inverse = reciprocal(machine, divisor);
+    let near = small * inverse;
+    let t = near + (small - near * divisor) * inverse;
+    let z = t * t;
+    let high =
+        (((M::F::of(ARC_8) * z + M::F::of(ARC_7)) * z + M::F::of(ARC_6)) * z + M::F::of(ARC_5)) * z
+            + M::F::of(ARC_4);
+    let tail = (((high * z + M::F::of(ARC_3)) * z + M::F::of(ARC_2)) * z + M::F::of(ARC_1)) * z
+        + M::F::of(ARC_0);
+    let flat = tail * (z * t) + t;
+    if steep {
+        (M::F::of(HALF_PI) - flat) + M::F::of(HALF_PI_LOW)
+    } else {
+        flat
+    }
+}
+
 pub(crate) fn arc_between<M: Machine>(
     machine: &M,
     start: [M::F; 4],
@@ -5689,7 +5717,7 @@ pub(crate) fn moving_span<M: Machine>(
     }
 }
 
-pub(crate) fn near_distance<M: Machine>(machine: &M, first: i32, j: u32) -> M::F {
+pub(crate) fn near_distance<M: Machine>(machine: &M, at: i32) -> M::F {
     const OF_KERNELS: [u8; 198] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0,

@@ -1120,9 +1120,9 @@ impl Kernel {
     }
 }
 pub(crate) static KERNELS: [KernelCode; 143] = [
-    KernelCode { kernel: Kernel::SelfTest, storage: ("self_test", 1920), texels: None, converting: None, bindings: &[Read, Write], segments: None, subgroups: false },
-    KernelCode { kernel: Kernel::ArcFramesAxisAngle, storage: ("arc_frames_axis_angle", 2937), texels: Some(("arc_frames_axis_angle_texels", 3063)), converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::Frames, Store::AxisAngle)), subgroups: false },
-    KernelCode { kernel: Kernel::ArcFramesEuler, storage: ("arc_frames_euler", 3598), texels: Some(("arc_frames_euler_texels", 3716)), converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::Frames, Store::Euler)), subgroups: false },
+    KernelCode { kernel: Kernel::SelfTest, storage: ("self_test", 1946), texels: None, converting: None, bindings: &[Read, Write], segments: None, subgroups: false },
+    KernelCode { kernel: Kernel::ArcFramesAxisAngle, storage: ("arc_frames_axis_angle", 2963), texels: Some(("arc_frames_axis_angle_texels", 3089)), converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::Frames, Store::AxisAngle)), subgroups: false },
+    KernelCode { kernel: Kernel::ArcFramesEuler, storage: ("arc_frames_euler", 3619), texels: Some(("arc_frames_euler_texels", 3737)), converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::Frames, Store::Euler)), subgroups: false },
     KernelCode { kernel: Kernel::ArcFramesF16, storage: ("arc_frames_f16", 2176), texels: Some(("arc_frames_f16_texels", 2294)), converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::Frames, Store::F16)), subgroups: false },
     KernelCode { kernel: Kernel::ArcFramesF32, storage: ("arc_frames_f32", 1920), texels: Some(("arc_frames_f32_texels", 2151)), converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::Frames, Store::F32)), subgroups: false },
     KernelCode { kernel: Kernel::ArcFramesMatrix3x3, storage: ("arc_frames_matrix3x3", 2604), texels: Some(("arc_frames_matrix3x3_texels", 2722)), converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::Frames, Store::Matrix3x3)), subgroups: false },
@@ -1258,9 +1258,9 @@ pub(crate) static KERNELS: [KernelCode; 143] = [
     KernelCode { kernel: Kernel::CrowdWholeMatrices, storage: ("crowd_whole_matrices", 10274), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Read, Read, Read, Read, Write, Write], segments: None, subgroups: false },
     KernelCode { kernel: Kernel::CrowdPlainWholeMatrices, storage: ("crowd_plain_whole_matrices", 6928), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Read, Read, Read, Read, Write, Write], segments: None, subgroups: false },
     KernelCode { kernel: Kernel::CrowdSubgroupRotations, storage: ("crowd_subgroup_rotations", 4532), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Read, Read, Write], segments: None, subgroups: true },
-    KernelCode { kernel: Kernel::MotionJoints, storage: ("motion_joints", 8574), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Read, Read, Write], segments: None, subgroups: false },
-    KernelCode { kernel: Kernel::MotionWalk, storage: ("motion_walk", 3886), texels: None, converting: None, bindings: &[Read, ReadWrite], segments: None, subgroups: false },
-    KernelCode { kernel: Kernel::MotionDifferences, storage: ("motion_differences", 3569), texels: None, converting: None, bindings: &[Read, ReadWrite], segments: None, subgroups: false },
+    KernelCode { kernel: Kernel::MotionJoints, storage: ("motion_joints", 8600), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Read, Read, Write], segments: None, subgroups: false },
+    KernelCode { kernel: Kernel::MotionWalk, storage: ("motion_walk", 3912), texels: None, converting: None, bindings: &[Read, ReadWrite], segments: None, subgroups: false },
+    KernelCode { kernel: Kernel::MotionDifferences, storage: ("motion_differences", 3595), texels: None, converting: None, bindings: &[Read, ReadWrite], segments: None, subgroups: false },
     KernelCode { kernel: Kernel::MotionStore, storage: ("motion_store", 625), texels: None, converting: None, bindings: &[Read, Write], segments: None, subgroups: false },
     KernelCode { kernel: Kernel::PrepareArcs, storage: ("prepare_arcs", 1870), texels: None, converting: None, bindings: &[Read, Read, Write], segments: None, subgroups: false },
 ];
