@@ -5,12 +5,18 @@
 # unpacked into target/mesa and not installed, and apt's own configuration and lists stay as they are.
 # Where this system has no such package, target/mesa/unavailable says why, and the tests compare
 # nothing with it.
+# MESA_SUITE=sid (or another suite of Debian) unpacks RADV of that suite too, 200 MB with its libraries, into
+# target/mesa/newest.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
 place=$PWD/target/mesa
 keyring=/usr/share/keyrings/debian-archive-keyring.gpg
-[ -e "$place/complete" ] && [ -e "$place/nvk/loader" ] && exit 0
+# Whether the newest one was asked for and is not there.
+is_missing() { [ -n "${MESA_SUITE:-}" ] && ! [ -e "$place/newest/loader" ]; }
+if [ -e "$place/complete" ] && [ -e "$place/nvk/loader" ] && ! is_missing; then
+    exit 0
+fi
 rm -rf "$place"
 mkdir -p "$place"
 
@@ -28,17 +34,19 @@ command -v apt-get >/dev/null && command -v dpkg-deb >/dev/null ||
 
 echo "unpacking a newer Mesa into target/mesa" >&2
 apt="$place/apt"
-# Downloads packages into $apt, by lists of their own: a suite, the names, and what is installed already.
+# Downloads packages into $apt, by lists of their own: the command (`install` takes what they depend on, too), a suite,
+# what is installed already, and the names.
 download() {
-    local suite=$1 installed=$2
-    shift 2
+    local command=$1 suite=$2 installed=$3
+    shift 3
     rm -rf "$apt"
     mkdir -p "$apt/lists/partial" "$apt/cache/archives/partial"
     echo "deb [signed-by=$keyring] http://deb.debian.org/debian $suite main" >"$apt/sources.list"
     local private=(apt-get -qq -o Dir::Etc::SourceList="$apt/sources.list" -o Dir::Etc::SourceParts=-
         -o Dir::State="$apt" -o Dir::State::Status="$installed"
         -o Dir::Cache="$apt/cache" -o APT::Sandbox::User=root)
-    "${private[@]}" update && (cd "$apt" && "${private[@]}" download "$@")
+    "${private[@]}" update && (cd "$apt" && "${private[@]}" "$command" "$@") &&
+        find "$apt/cache" -name '*.deb' -exec mv -t "$apt" {} +
 }
 # Extracts files from packages in $apt: a folder, then patterns of their names.
 extract() {
@@ -55,9 +63,9 @@ nvk=(mesa-vulkan-drivers mesa-drm-shim libc6 libgcc-s1 libstdc++6 libdrm2 libexp
     libxcb-xfixes0 libxcb-sync1 libxcb-randr0 libxcb-shm0 libxshmfence1)
 mkdir "$place/nvk"
 touch "$place/none"
-if ! { download bookworm-backports /var/lib/dpkg/status mesa-vulkan-drivers/bookworm-backports &&
+if ! { download download bookworm-backports /var/lib/dpkg/status mesa-vulkan-drivers/bookworm-backports &&
     extract "$place" 'libvulkan_lvp.so' 'libvulkan_radeon.so' 'lvp_icd.json' 'radeon_icd.json' &&
-    download trixie "$place/none" "${nvk[@]}" &&
+    download download trixie "$place/none" "${nvk[@]}" &&
     extract "$place/nvk" 'nouveau_icd.json' 'libvulkan_nouveau.so' 'libnouveau_noop_drm_shim.so' 'ld-linux*' \
         'lib*.so.[0-9]*' && [ -e "$place/libvulkan_lvp.so" ] && [ -e "$place/libvulkan_radeon.so" ] &&
     [ -e "$place/nvk/libvulkan_nouveau.so" ] && [ -e "$place/nvk/libnouveau_noop_drm_shim.so" ]; }; then
@@ -66,12 +74,22 @@ if ! { download bookworm-backports /var/lib/dpkg/status mesa-vulkan-drivers/book
     echo "compare nothing (where CI is set they fail)" >&2
     exit 0
 fi
-rm -rf "$apt" "$place/none"
-loader=$(cd "$place/nvk" && echo ld-linux*)
-ln -s "$loader" "$place/nvk/loader"
+if [ -n "${MESA_SUITE:-}" ]; then
+    mkdir "$place/newest"
+    download install "$MESA_SUITE" "$place/none" --yes --download-only --no-install-recommends \
+        mesa-vulkan-drivers mesa-drm-shim
+    extract "$place/newest" 'radeon_icd.json' 'libvulkan_radeon.so' 'libamdgpu_noop_drm_shim.so' 'ld-linux*' 'libelf-*.so' \
+        'lib*.so.[0-9]*'
+fi
+rm -rf "$apt" "$place/none" "$place"/lock*
+for folder in "$place/nvk" "$place/newest"; do
+    if [ -e "$folder" ]; then
+        (cd "$folder" && ln -s ld-linux* loader)
+    fi
+done
 # A name without a folder is that of an installed driver; the loader looks for others beside the
 # manifest.
-for manifest in "$place"/*_icd.json "$place/nvk/nouveau_icd.json"; do
+for manifest in "$place"/*_icd.json "$place"/n*/*_icd.json; do
     sed -i 's|"libvulkan_|"./libvulkan_|' "$manifest"
 done
 touch "$place/complete"

@@ -227,6 +227,9 @@ pub enum CrowdError {
         "the crowd was not made by an engine on the buffer's Vulkan device; make it with Engine::from_vulkan"
     )]
     OtherDevice,
+    /// Clips are to lie on a device, and the engine is the CPU.
+    #[error("the engine is the CPU, which has no memory of its own; open a Vulkan device")]
+    OnCpu,
     /// The range of a buffer does not fit the result.
     #[error(
         "the buffer's range of {size} bytes at {offset} does not fit: the result has {needed} bytes, and starts at a multiple of {}",

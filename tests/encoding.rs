@@ -7,9 +7,63 @@ use std::path::Path;
 
 use crate::support::{KERNEL_OPTIONS, hostile_set, is_due, vulkan_engines};
 use glam::Quat;
+use tumble::vulkan::tuning::{Mapping, Reads};
 use tumble::{
-    Axes, Device, Encoding, Engine, Error, Interpolation, Layout, Quantity, SampleTimes, method,
+    Axes, Clip, Device, Encoding, Engine, Error, Interpolation, Layout, Quantity, SampleTimes,
+    TrackSet, method,
 };
+
+/// Frame by frame, on cards neighbouring invocations evaluate the same run of neighbouring tracks: more tracks than fill
+/// their lanes, keys on frames and off them, listed times, parts of a result, and components that are nearly 0.
+#[test]
+fn tracks_with_the_same_times_have_the_bits_of_the_cpu_frame_by_frame() {
+    const TRACKS: usize = 45;
+    let times = [0.0, 0.25, 0.9, 1.0, 2.013, 4.0, 4.5];
+    let key = |i: usize| {
+        let angle = if i % 5 == 0 {
+            1e-21
+        } else {
+            0.1 * (i % 7) as f32
+        };
+        Quat::from_rotation_x(angle) * Quat::from_rotation_z(0.2 * (i % 3) as f32)
+    };
+    let keys: Vec<Quat> = (0..times.len() * TRACKS).map(key).collect();
+    let set = TrackSet::with_shared_times(&times, &keys).unwrap();
+    let listed = (0..90).map(|i| 0.051 * f64::from(i) - 0.1).collect();
+    let requests = [
+        (SampleTimes::fps(60).between(-0.2, 4.7), &Encoding::ALL[..]),
+        (SampleTimes::at(listed), &[Encoding::F32, Encoding::F16][..]),
+    ];
+    let cpu = Engine::new(Device::Cpu).unwrap();
+    let engines = vulkan_engines(|_| {});
+    let is_as_cards = |options: &&(Reads, Mapping)| options.1 == Mapping::Samples;
+    let others = KERNEL_OPTIONS
+        .iter()
+        .take_while(|options| !is_as_cards(options))
+        .count();
+    for method in [method::SLERP, method::BESSEL_OVERHAUSER] {
+        let of_cpu = cpu.upload(&set, method).unwrap();
+        for (frames, encodings) in &requests {
+            for engine in engines.iter().skip(others).step_by(KERNEL_OPTIONS.len()) {
+                let clip = engine.upload(&set, method).unwrap();
+                for &encoding in *encodings {
+                    for (tracks, samples) in [(0..TRACKS, 0..80), (3..40, 11..70)] {
+                        let part = |clip: &Clip| {
+                            let request = clip.request(frames).layout(Layout::FrameMajor);
+                            let request = request.tracks(tracks.clone()).samples(samples.clone());
+                            request.encoding(encoding).evaluate_bytes().unwrap()
+                        };
+                        assert!(
+                            part(&clip) == part(&of_cpu),
+                            "{:?}, {method}, {encoding:?}, tracks {tracks:?}",
+                            engine.device_name()
+                        );
+                    }
+                }
+            }
+        }
+    }
+}
 
 #[test]
 fn every_device_encodes_like_the_host() {

@@ -208,6 +208,7 @@ fn every_shader_function_has_its_twin() {
                 "alone",
                 "together",
                 "crowd",
+                "motion",
                 "whole",
                 "whole_rotations",
                 "whole_matrices",
@@ -232,6 +233,7 @@ fn every_shader_function_has_its_twin() {
                 "f32_wide",
                 "wide",
                 "vector",
+                "store",
             ];
             assert!(glue.contains(&name), "{name}.wgsl names no twin");
             continue;

@@ -692,7 +692,7 @@ fn fbx_goes_into_other_formats() {
     assert_eq!(apart.code, 8, "{}", apart.words);
     let refused = run(folder, &["convert", "walk.glb", "-o", "back.fbx"]);
     assert_ne!(refused.code, 0, "{}", refused.words);
-    let scaled = run(folder, &["info", "walk.glb", "--scale", "metres"]);
+    let scaled = run(folder, &["info", "metres.bvh", "--scale", "metres"]);
     assert!(
         scaled.words.contains("does not state its unit of length"),
         "{}",

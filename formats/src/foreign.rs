@@ -25,7 +25,12 @@ macro_rules! of_markers {
 }
 
 /// The first row whose signature or extension fits.
-const ALL: [Foreign; 25] = [
+const ALL: [Foreign; 26] = [
+    Foreign {
+        extensions: &[],
+        begins: &[b"version https://git-lfs"],
+        description: "a pointer of Git LFS; the file itself is not here (`git lfs pull` fetches it)",
+    },
     Foreign {
         extensions: &["gz"],
         begins: &[b"\x1f\x8b"],
@@ -238,6 +243,13 @@ mod tests {
             ("x.usd", b"PXR-USDC\0", "OpenUSD", "GLB"),
             ("x.vrma", b"\0\0\0\0", "VRM", "export it again"),
             ("x.gif", b"GIF89a\xc9\0", "a picture", "no keyframes"),
+            ("x.glb", b"\x89PNG\r\n\x1a\n\0", "a picture", "no keyframes"),
+            (
+                "y.glb",
+                b"version https://git-lfs.github.com/spec/v1\n",
+                "a pointer of Git LFS",
+                "git lfs pull",
+            ),
             ("x.mp4", b"\0\0\0\x20ftypisom", "a film", "estimate poses"),
             (
                 "guide.html",

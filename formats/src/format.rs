@@ -301,7 +301,7 @@ pub struct Space {
 
 impl Space {
     /// The unit and the up axis of glTF.
-    const GLTF: Self = Self {
+    pub(crate) const GLTF: Self = Self {
         up: DVec3::Y,
         metres: 1.0,
     };

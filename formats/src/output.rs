@@ -267,6 +267,15 @@ pub fn remove_marked(directory: &Path, mark: &str) {
     });
 }
 
+/// As [`remove_abandoned`], of the temporary files that were created with `mark` alone: those of a worker of this machine
+/// that was killed, not those of one that still runs.
+pub fn remove_abandoned_marked(directory: &Path, mark: &str) {
+    remove_temporary(directory, |folder, name, of_file| {
+        let is_marked = of_file.starts_with(mark);
+        is_marked.then(|| unlocked(folder, name))?
+    });
+}
+
 /// Removes those of a directory's temporary files for which `claim` returns something, which lives until the file is
 /// removed: a writer that could lock its new file before that would lose it. `claim` gets the directory, the name and
 /// the mark in the name.

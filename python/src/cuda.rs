@@ -461,20 +461,20 @@ impl Mapping {
         })
     }
 
-    /// Copies the result to the host, when it is written.
-    pub(crate) fn copy_to_host(&self, bytes: &mut [u8]) -> Result<(), CudaError> {
+    /// Copies bytes of the result from `start` on to the host, when it is written.
+    pub(crate) fn copy_to_host(&self, start: usize, bytes: &mut [u8]) -> Result<(), CudaError> {
         self.check_process()?;
         self.result.wait()?;
         self.order(DEFAULT_STREAM)?; // on which the copy is
         let Some(address) = self.address else {
             return Ok(());
         };
-        let size = bytes.len().min(self.result.bytes() as usize);
+        let size = bytes.len().min(self.result.bytes() as usize - start);
         in_context(self.cuda, self.context, || {
             // SAFETY: both have at least so many bytes.
             let code = unsafe {
                 let copy = self.cuda.functions.copy_to_host;
-                copy(bytes.as_mut_ptr().cast(), address, size)
+                copy(bytes.as_mut_ptr().cast(), address + start as Address, size)
             };
             self.cuda.checked("cuMemcpyDtoH", code)
         })

@@ -1,11 +1,12 @@
-//! `tumble.DeviceArray`: a result that stays on the card.
+//! `tumble.DeviceArray`: a result that stays in the memory of a device.
 
 use std::sync::Arc;
 
-use pyo3::exceptions::PyBufferError;
+use pyo3::exceptions::{PyAttributeError, PyBufferError, PyTypeError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 use tumble::ComponentType;
+use tumble::crowd::MappedStates;
 use tumble::vulkan::ExportedResult;
 
 use crate::arrays::numpy;
@@ -14,10 +15,14 @@ use crate::dlpack::{self, CPU, CUDA};
 use crate::errors::{device, guarded};
 use crate::output::{array_of, filled_bytes, type_name};
 
-/// A result in the memory of an NVIDIA card, made by `Engine.evaluate(…, device_array=True)` there:
-/// `torch.from_dlpack`, `cupy.from_dlpack` and `jax.dlpack.from_dlpack` import it without a copy, and so do libraries
-/// that use `__cuda_array_interface__`. The card may still be writing the result. The stream that imports it waits for
-/// the card; your Python code does not. All imported tensors share its memory, which is freed after the last of them.
+/// A result in the memory of a device, made by `Engine.evaluate(…, device_array=True)` on an NVIDIA card, or by a
+/// `MotionLibrary(…, device=…)`: `torch.from_dlpack`, `cupy.from_dlpack` and `jax.dlpack.from_dlpack` import it without a
+/// copy, and so do libraries that use `__cuda_array_interface__`. The card may still be writing the result. The stream
+/// that imports it waits for the card; your Python code does not. All imported tensors share its memory, which is freed
+/// after the last of them.
+///
+/// Results of a motion library on a device that CUDA does not have are in memory of the host: software devices write
+/// them there, and other cards copy them there. `numpy.from_dlpack` imports them without a copy, too.
 ///
 /// >>> import tumble, torch  # doctest: +SKIP
 /// >>> clip = tumble.Clip([0.0, 1.0], [[0, 0, 0, 1], [0, 0, 1, 0]])  # doctest: +SKIP
@@ -26,9 +31,56 @@ use crate::output::{array_of, filled_bytes, type_name};
 /// (DeviceArray(shape=(1, 25, 4), dtype=float32, device='cuda:0'), device(type='cuda', index=0))
 #[pyclass(frozen, weakref, module = "tumble")]
 pub(crate) struct DeviceArray {
-    mapping: Arc<Mapping>,
+    memory: Arc<ArrayMemory>,
+    /// The start of the array in the memory, bytes.
+    start: usize,
     shape: Vec<usize>,
     component: ComponentType,
+}
+
+/// The memory of one array or several.
+pub(crate) enum ArrayMemory {
+    /// Of a card that CUDA has.
+    Card(Mapping),
+    /// Of the host, complete.
+    Host(MappedStates),
+}
+
+impl ArrayMemory {
+    /// Memory of a card. Called without the interpreter's lock.
+    pub(crate) fn on_card(result: ExportedResult) -> Result<Self, CudaError> {
+        Mapping::new(result).map(Self::Card)
+    }
+
+    /// Its device, as DLPack numbers devices.
+    pub(crate) fn device(&self) -> (i32, i32) {
+        match self {
+            Self::Card(mapping) => (CUDA, mapping.ordinal),
+            Self::Host(_) => (CPU, 0),
+        }
+    }
+
+    /// The address of its first byte.
+    pub(crate) fn address(&self) -> usize {
+        match self {
+            Self::Card(mapping) => mapping.address() as usize,
+            Self::Host(states) => states.bytes().as_ptr().expose_provenance(),
+        }
+    }
+
+    /// Copies bytes from `start` on to the host.
+    fn copy_to_host(&self, start: usize, bytes: &mut [u8]) -> PyResult<()> {
+        match self {
+            Self::Card(mapping) => {
+                let copied = mapping.copy_to_host(start, bytes);
+                copied.map_err(|error| of_cuda(&error))
+            }
+            Self::Host(states) => {
+                bytes.copy_from_slice(&states.bytes()[start..][..bytes.len()]);
+                Ok(())
+            }
+        }
+    }
 }
 
 /// CUDA's refusal, with the remedy in Python.
@@ -45,16 +97,30 @@ impl DeviceArray {
         shape: Vec<usize>,
         component: ComponentType,
     ) -> PyResult<Self> {
-        let mapping = Mapping::new(result).map_err(|error| of_cuda(&error))?;
+        let memory = ArrayMemory::on_card(result).map_err(|error| of_cuda(&error))?;
         Ok(Self {
-            mapping: Arc::new(mapping),
+            memory: Arc::new(memory),
+            start: 0,
             shape,
             component,
         })
     }
 
+    /// An array of f32 in memory of several arrays.
+    pub(crate) fn within(memory: &Arc<ArrayMemory>, start: usize, shape: Vec<usize>) -> Self {
+        Self {
+            memory: Arc::clone(memory),
+            start,
+            shape,
+            component: ComponentType::F32,
+        }
+    }
+
     /// Lets a stream wait for the result, as the standard of arrays numbers streams: none is the default one.
     fn order(&self, stream: Option<i64>) -> PyResult<()> {
+        let ArrayMemory::Card(mapping) = &*self.memory else {
+            return Ok(());
+        };
         let stream = match stream {
             None => DEFAULT_STREAM,
             Some(-1) => return Ok(()), // the consumer orders its work itself
@@ -70,7 +136,7 @@ impl DeviceArray {
                 ))
             })?,
         };
-        (self.mapping.order(stream)).map_err(|error| of_cuda(&error))
+        mapping.order(stream).map_err(|error| of_cuda(&error))
     }
 }
 
@@ -88,13 +154,14 @@ impl DeviceArray {
         numpy(py)?.call_method1("dtype", (type_name(self.component),))
     }
 
-    /// How readers are ordered after the card's writing: "stream" if the stream that takes the array waits for it,
-    /// "host" if the host has waited already, because the Vulkan device exports no semaphore or CUDA takes none.
+    /// How readers are ordered after the device's writing: "stream" if the stream that takes the array waits for it,
+    /// "host" if the host has waited already: for results in memory of the host, and if the Vulkan device exports no
+    /// semaphore or CUDA takes none.
     #[getter]
     fn waited_by(&self) -> &'static str {
-        match self.mapping.is_ordered_by_streams() {
-            true => "stream",
-            false => "host",
+        match &*self.memory {
+            ArrayMemory::Card(mapping) if mapping.is_ordered_by_streams() => "stream",
+            _ => "host",
         }
     }
 
@@ -110,16 +177,20 @@ impl DeviceArray {
         dl_device: Option<(i32, i32)>,
         copy: Option<bool>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let ordinal = self.mapping.ordinal;
+        let here = self.memory.device();
+        let is_on_host = here.0 == CPU;
         match dl_device {
-            Some((CPU, _)) if copy != Some(false) => {
+            None if is_on_host && copy == Some(true) => {
+                return self.numpy(py)?.call_method0("__dlpack__");
+            }
+            Some((CPU, _)) if copy == Some(true) || (copy.is_none() && !is_on_host) => {
                 return self.numpy(py)?.call_method0("__dlpack__");
             }
             None => {}
-            Some(there) if there == (CUDA, ordinal) => {}
+            Some(there) if there == here => {}
             Some(there) => {
                 return Err(PyBufferError::new_err(format!(
-                    "dl_device: the array is on (2, {ordinal}), not on {there:?}; import it there, and then copy it"
+                    "dl_device: the array is on {here:?}, not on {there:?}; import it there, and then copy it"
                 )));
             }
         }
@@ -130,23 +201,29 @@ impl DeviceArray {
         }
         self.order(stream)?;
         let is_versioned = max_version.is_some_and(|(major, _)| major >= 1);
-        let (mapping, shape) = (&self.mapping, &self.shape);
-        dlpack::capsule(py, mapping, shape, self.component, is_versioned)
+        let located = (&self.memory, self.start);
+        dlpack::capsule(py, located, &self.shape, self.component, is_versioned)
     }
 
-    /// Where it is: (2, the card's number among those that CUDA sees).
+    /// Where it is: (2, the card's number among those that CUDA sees), or (1, 0) in memory of the host.
     fn __dlpack_device__(&self) -> (i32, i32) {
-        (CUDA, self.mapping.ordinal)
+        self.memory.device()
     }
 
-    /// Numba's interface, version 3. The library that takes the array lets its stream wait for the one that is named there.
+    /// Numba's interface, version 3, of an array on a card. The library that takes the array lets its stream wait for the
+    /// one that is named there.
     #[getter]
     fn __cuda_array_interface__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        if let ArrayMemory::Host(_) = &*self.memory {
+            return Err(PyAttributeError::new_err(
+                "__cuda_array_interface__: the array is in memory of the host; use numpy.from_dlpack",
+            ));
+        }
         self.order(None)?;
         let interface = PyDict::new(py);
         interface.set_item("shape", self.shape(py)?)?;
         interface.set_item("typestr", self.dtype(py)?.getattr("str")?)?;
-        interface.set_item("data", (self.mapping.address(), false))?;
+        interface.set_item("data", (self.memory.address() + self.start, false))?;
         interface.set_item("version", 3)?;
         interface.set_item("strides", py.None())?;
         interface.set_item("stream", DEFAULT_STREAM)?;
@@ -159,21 +236,25 @@ impl DeviceArray {
     fn numpy<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let array = array_of(py, self.component, &self.shape, None, &[])?;
         filled_bytes(&array, |bytes| {
-            guarded(|| (self.mapping.copy_to_host(bytes)).map_err(|error| of_cuda(&error)))
+            guarded(|| self.memory.copy_to_host(self.start, bytes))
         })?;
         Ok(array)
     }
 
-    fn __len__(&self) -> usize {
-        self.shape[0]
+    fn __len__(&self) -> PyResult<usize> {
+        let first = self.shape.first().copied();
+        first.ok_or_else(|| PyTypeError::new_err("len() of an array without axes"))
     }
 
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
+        let device = match self.memory.device() {
+            (CUDA, ordinal) => format!("cuda:{ordinal}"),
+            _ => "cpu".to_owned(),
+        };
         Ok(format!(
-            "DeviceArray(shape={}, dtype={}, device='cuda:{}')",
+            "DeviceArray(shape={}, dtype={}, device='{device}')",
             self.shape(py)?.repr()?,
             type_name(self.component),
-            self.mapping.ordinal
         ))
     }
 }

@@ -12,7 +12,7 @@ use pyo3::ffi;
 use pyo3::prelude::*;
 use tumble::ComponentType;
 
-use crate::cuda::Mapping;
+use crate::device_array::ArrayMemory;
 
 /// `kDLCPU` and `kDLCUDA`.
 pub(crate) const CPU: i32 = 1;
@@ -74,7 +74,7 @@ struct Version {
 struct TensorBuffers {
     shape: Box<[i64]>,
     strides: Box<[i64]>,
-    _mapping: Arc<Mapping>,
+    _memory: Arc<ArrayMemory>,
 }
 
 /// `DLManagedTensor`, and behind it what is ours.
@@ -134,11 +134,11 @@ unsafe extern "C" fn destroy(capsule: *mut ffi::PyObject) {
     }
 }
 
-/// A capsule of an array on a card, in C order, in the form with a version or the older one. The memory lives for as
+/// A capsule of an array that begins at a byte of a memory, in C order, in the form with a version or the older one. The memory lives for as
 /// long as the capsule or its consumer has it.
 pub(crate) fn capsule<'py>(
     py: Python<'py>,
-    mapping: &Arc<Mapping>,
+    (memory, start): (&Arc<ArrayMemory>, usize),
     shape: &[usize],
     component: ComponentType,
     is_versioned: bool,
@@ -150,14 +150,12 @@ pub(crate) fn capsule<'py>(
     let mut buffers = TensorBuffers {
         shape: shape.iter().map(|&length| length as i64).collect(),
         strides: strides.into_boxed_slice(),
-        _mapping: Arc::clone(mapping),
+        _memory: Arc::clone(memory),
     };
+    let (kind, ordinal) = memory.device();
     let tensor = Tensor {
-        data: std::ptr::with_exposed_provenance_mut(mapping.address() as usize),
-        device: Device {
-            kind: CUDA,
-            ordinal: mapping.ordinal,
-        },
+        data: std::ptr::with_exposed_provenance_mut(memory.address() + start),
+        device: Device { kind, ordinal },
         axes: shape.len() as i32,
         kind: DataType::of(component),
         shape: buffers.shape.as_mut_ptr(),

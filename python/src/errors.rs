@@ -313,8 +313,13 @@ pub(crate) fn of_track_since(second: i64, error: &TrackError) -> PyErr {
 pub(crate) fn of_engine(error: &Error) -> PyErr {
     let message = error.to_string();
     match error {
-        Error::Vulkan(_) | Error::Threads(_) | Error::ExportOnCpu => device(&message),
-        Error::Stopped(_) => PyKeyboardInterrupt::new_err(message),
+        Error::Vulkan(_)
+        | Error::Threads(_)
+        | Error::ExportOnCpu
+        | Error::Crowd(CrowdError::Vulkan(_) | CrowdError::Threads(_)) => device(&message),
+        Error::Stopped(_) | Error::Crowd(CrowdError::Stopped(_)) => {
+            PyKeyboardInterrupt::new_err(message)
+        }
         Error::OutOfMemory(_) | Error::Crowd(CrowdError::OutOfMemory(_)) => {
             PyMemoryError::new_err(message)
         }

@@ -13,6 +13,7 @@ mod compare;
 mod crowd;
 mod cuda;
 mod device_array;
+mod device_motions;
 mod dlpack;
 mod engine;
 mod errors;
@@ -61,6 +62,8 @@ mod _tumble {
     use crate::crowd::Crowd;
     #[pymodule_export]
     use crate::device_array::DeviceArray;
+    #[pymodule_export]
+    use crate::device_motions::DeviceMotions;
     #[pymodule_export]
     use crate::engine::Engine;
     #[pymodule_export]

@@ -497,7 +497,7 @@ impl Motions {
 
     /// Number of joints.
     #[getter]
-    fn joints(&self) -> usize {
+    pub(crate) fn joints(&self) -> usize {
         self.tables.joint_count()
     }
 
@@ -578,8 +578,21 @@ impl Motions {
 }
 
 impl Motions {
+    /// Does work with the tables, without the interpreter's lock.
+    pub(crate) fn with_parts<T: Send>(
+        &self,
+        py: Python<'_>,
+        work: impl FnOnce(&MotionTables, (&[[u32; 4]], &[[f32; 4]])) -> PyResult<T> + Send,
+    ) -> PyResult<T> {
+        let spans = self.spans.bind(py).try_readonly()?;
+        let cells = self.cells.bind(py).try_readonly()?;
+        let spans = spans.as_slice()?.as_chunks().0;
+        let cells = cells.as_slice()?.as_chunks().0;
+        py.detach(|| work(&self.tables, (spans, cells)))
+    }
+
     /// Refuses positions of clips whose joints have none.
-    fn check_placed(&self, at: &[(u32, u32)]) -> PyResult<()> {
+    pub(crate) fn check_placed(&self, at: &[(u32, u32)]) -> PyResult<()> {
         let reasons = at.iter().map(|&(clip, _)| self.unplaced.get(clip as usize));
         match reasons.flatten().find(|reason| !reason.is_empty()) {
             None => Ok(()),
@@ -590,7 +603,7 @@ impl Motions {
     }
 
     /// The two frames around the time of each instance, for the rate of its clip.
-    fn steps(
+    pub(crate) fn steps(
         &self,
         at: &[(u32, u32)],
         times: &PyReadonlyArray1<'_, f64>,
@@ -614,7 +627,7 @@ impl Motions {
     }
 
     /// The clip and the tick of each instance; times outside of a clip are its ends.
-    fn instances(
+    pub(crate) fn instances(
         &self,
         clip_ids: &PyReadonlyArray1<'_, i64>,
         times: &PyReadonlyArray1<'_, f64>,

@@ -189,6 +189,44 @@ for engine in all:
     run(script, driver("failing", semaphores=True))
 
 
+@pytest.mark.parametrize("semaphores", [False, True])
+def test_motion_libraries_leave_their_arrays_on_the_card_that_cuda_has(driver, semaphores):
+    script = """
+cuda = ctypes.CDLL("libcuda.so.1")
+alive = lambda: ctypes.c_int.in_dll(cuda, "stub_alive").value
+body = tumble.Clip(times, keys, layout="track", parents=[None, 0, 1, 1, 0], offsets=rng.normal(size=(5, 3)))
+NAMES = ["rotations", "positions", "world_rotations", "velocities", "angular_velocities"]
+ids, at = np.zeros(70, int), rng.uniform(0, 2, 70)
+for engine in exporting():
+    # CUDA does not have the device: memory of the host.
+    state = tumble.MotionLibrary([body], device=engine).sample(0, 0.5)
+    assert state.positions.__dlpack_device__() == (1, 0) and alive() == 0
+    try:
+        evaluate(engine)
+    except tumble.DeviceError as error:
+        os.environ["STUB_CUDA_UUIDS"] = re.search("UUID ([0-9a-f-]+)", str(error))[1]
+    cpu, library = (tumble.MotionLibrary([body], device=device) for device in (None, engine))
+    assert alive() == 0
+    for finite in (False, True):
+        expected, state = (one.sample(ids, at, finite=finite) for one in (cpu, library))
+        # All arrays are in one memory, each at an aligned address.
+        assert alive() == 2 + expects_semaphores and state.velocities.waited_by == ("stream" if expects_semaphores else "host")
+        for name in NAMES:
+            found, same = getattr(state, name), getattr(expected, name)
+            assert found.__dlpack_device__() == (2, 0) and found.numpy().tobytes() == same.tobytes(), name
+            address = found.__cuda_array_interface__["data"][0]
+            assert address % 256 == 0 and ctypes.string_at(address, same.nbytes) == same.tobytes()
+        del found
+        positions = state.positions
+        del state
+        assert alive() == 2 + expects_semaphores and positions.numpy().tobytes() == expected.positions.tobytes()
+        del positions
+    assert alive() == 0
+    del os.environ["STUB_CUDA_UUIDS"]
+"""
+    run(f"expects_semaphores = {semaphores}\n" + script, driver(f"library{semaphores}", semaphores=semaphores))
+
+
 # The structures of DLPack's header, and the calls of a consumer.
 CONSUMER = """
 class Tensor(ctypes.Structure):

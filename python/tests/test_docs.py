@@ -175,6 +175,11 @@ try:
     found = library.sample(ids, at, arrays=["rotations"], rotations="6d").rotations[0]
     found = library.sample_windows(ids, at, 10, fps=30).velocities[:, 0]
     found = library.shard(0, 2).sample(0, 0.5, arrays=["positions", "velocities"]).velocities
+    other: tumble.MotionLibrary = tumble.MotionLibrary([clip], device="cpu")
+    on_card = tumble.MotionLibrary.open("motions.npz", device="vulkan")
+    kept = on_card.sample(ids, at, finite=True).positions
+    kept = on_card.shard(0, 2).sample_windows(ids, at, 10, fps=30, arrays=["rotations"]).rotations
+    kept = tumble.MotionLibrary.load("amass/*.npz", device=engine).sample(0, 0.5).angular_velocities
 except tumble.InputError as error:
     print(error.code, error.line, error.pointer)
 '''

@@ -23,7 +23,7 @@ use naga::{
 
 /// The functions that are written, each with its cut: the names of `let` after which a pipelined loop interrupts it.
 /// A function `f` with a cut is written as `f_begin` and `f_end`, too.
-const FUNCTIONS: [(&str, &[&str]); 36] = [
+const FUNCTIONS: [(&str, &[&str]); 37] = [
     ("canonical", &[]),
     ("flushed", &[]),
     ("flushed4", &[]),
@@ -31,6 +31,7 @@ const FUNCTIONS: [(&str, &[&str]); 36] = [
     ("reciprocal", &[]),
     ("reciprocal_root", &[]),
     ("root", &[]),
+    ("acute_arc_tangent", &[]),
     ("arc_tangent", &[]),
     ("sine_cosine", &[]),
     ("sine_cosm1", &[]),

@@ -213,7 +213,7 @@ const FROM_KEYS: [(&str, &[&str], usize); 3] = [
         ],
         2,
     ),
-    ("cubics", &["from_keys/small_angle"], 3),
+    ("cubics", &["math/vector", "from_keys/small_angle"], 3),
 ];
 
 /// The kernel that prepares arcs: its files.
@@ -242,7 +242,7 @@ const POSES: [&str; 6] = [
 ];
 
 /// The files that evaluate the channels of a crowd's joints.
-const CHANNELS: [&str; 9] = [
+const CHANNELS: [&str; 10] = [
     "math/canonical",
     "math/sine_cosine",
     "math/arc_tangent",
@@ -252,6 +252,7 @@ const CHANNELS: [&str; 9] = [
     "crowd/entry",
     "crowd/cubic",
     "crowd/sampled",
+    "crowd/layer_value",
 ];
 
 /// The same where it is simple.
@@ -415,6 +416,50 @@ static WHOLE_READS: [Read; 6] = [
     read("cells", "vec4f", "cell_at"),
 ];
 
+/// Kernels over the states of a library's clips, each with the files that it needs beside the entry point.
+const MOTION: [(&str, &[&str]); 4] = [
+    (
+        "joints",
+        &[
+            "math/sine_cosine",
+            "math/arc_tangent",
+            "math/quaternion",
+            "math/polynomial",
+            "forms/evaluate_arc",
+            "from_keys/arc_between",
+            "lists/frame_distance",
+            "crowd/entry",
+            "crowd/time_tables",
+            "crowd/span_search",
+            "crowd/cubic",
+            "crowd/sampled",
+            "motion/packed",
+            "motion/joints",
+        ],
+    ),
+    (
+        "walk",
+        &[
+            "math/sine_cosine",
+            "math/arc_tangent",
+            "math/quaternion",
+            "math/vector",
+            "crowd/link",
+            "motion/walk",
+        ],
+    ),
+    (
+        "differences",
+        &[
+            "math/sine_cosine",
+            "math/arc_tangent",
+            "math/quaternion",
+            "motion/differences",
+        ],
+    ),
+    ("store", &["motion/store"]),
+];
+
 /// The files of the self-test.
 const SELF_TEST: [&str; 3] = ["math/sine_cosine", "math/arc_tangent", "self_test"];
 
@@ -537,6 +582,17 @@ pub(crate) fn kernels() -> Vec<Kernel> {
         streams_results: false,
         converts: false,
     });
+    for (name, parts) in MOTION {
+        kernels.push(Kernel {
+            name: format!("motion_{name}"),
+            files: [&["math/canonical", "motion"], parts].concat(),
+            reads: Vec::new(),
+            has_texels: false,
+            loads_vectors: false,
+            streams_results: false,
+            converts: false,
+        });
+    }
     kernels.push(Kernel {
         name: "prepare_arcs".to_owned(),
         files: PREPARE_ARCS.to_vec(),

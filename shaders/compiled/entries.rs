@@ -40,6 +40,7 @@ pub(crate) enum Global {
     Mixed,
     Positions,
     Probes,
+    Rates,
     Reference,
     Replies,
     Rotations,
@@ -48,6 +49,7 @@ pub(crate) enum Global {
     Segments,
     Smoothed,
     Spans,
+    States,
     Steps,
     Tile,
     TimeBases,
@@ -93,6 +95,7 @@ impl Global {
         Self::Mixed,
         Self::Positions,
         Self::Probes,
+        Self::Rates,
         Self::Reference,
         Self::Replies,
         Self::Rotations,
@@ -101,6 +104,7 @@ impl Global {
         Self::Segments,
         Self::Smoothed,
         Self::Spans,
+        Self::States,
         Self::Steps,
         Self::Tile,
         Self::TimeBases,
@@ -112,13 +116,13 @@ impl Global {
     ];
 }
 
-pub(crate) const GLOBALS: usize = 48;
+pub(crate) const GLOBALS: usize = 50;
 
 /// Variables of which each invocation has its own.
 pub(crate) const PRIVATE: [Global; 1] = [Global::FirstEntry];
 
 /// The variables that kernels bind, in the order of the bindings.
-const BOUND: [&[Global]; 25] = [
+const BOUND: [&[Global]; 29] = [
     &[Global::Probes, Global::Replies],
     &[
         Global::Segments,
@@ -232,6 +236,18 @@ const BOUND: [&[Global]; 25] = [
         Global::Cells,
         Global::Rotations,
     ],
+    &[
+        Global::Samples,
+        Global::Clips,
+        Global::TimeBases,
+        Global::Spans,
+        Global::Channels,
+        Global::Cells,
+        Global::States,
+    ],
+    &[Global::Links, Global::States],
+    &[Global::Rates, Global::States],
+    &[Global::States, Global::Values],
     &[Global::Keys, Global::Intervals, Global::Rotations],
 ];
 
@@ -250,32 +266,32 @@ const fn entry(
 }
 
 /// The entry points: those of the kernels in their order, and then those that read texel buffers.
-pub(crate) static ENTRIES: [Entry; 194] = [
+pub(crate) static ENTRIES: [Entry; 198] = [
     entry(0, None, 64, None),
-    entry(1, Some(Global::Dispatch), 64, Some(139)),
-    entry(1, Some(Global::Dispatch), 64, Some(140)),
-    entry(1, Some(Global::Dispatch), 64, Some(141)),
-    entry(1, Some(Global::Dispatch), 64, Some(142)),
     entry(1, Some(Global::Dispatch), 64, Some(143)),
     entry(1, Some(Global::Dispatch), 64, Some(144)),
     entry(1, Some(Global::Dispatch), 64, Some(145)),
     entry(1, Some(Global::Dispatch), 64, Some(146)),
-    entry(2, Some(Global::Dispatch), 64, Some(147)),
-    entry(2, Some(Global::Dispatch), 64, Some(148)),
-    entry(2, Some(Global::Dispatch), 64, Some(149)),
-    entry(2, Some(Global::Dispatch), 64, Some(150)),
+    entry(1, Some(Global::Dispatch), 64, Some(147)),
+    entry(1, Some(Global::Dispatch), 64, Some(148)),
+    entry(1, Some(Global::Dispatch), 64, Some(149)),
+    entry(1, Some(Global::Dispatch), 64, Some(150)),
     entry(2, Some(Global::Dispatch), 64, Some(151)),
     entry(2, Some(Global::Dispatch), 64, Some(152)),
     entry(2, Some(Global::Dispatch), 64, Some(153)),
     entry(2, Some(Global::Dispatch), 64, Some(154)),
-    entry(3, Some(Global::Dispatch), 64, Some(155)),
-    entry(3, Some(Global::Dispatch), 64, Some(156)),
-    entry(3, Some(Global::Dispatch), 64, Some(157)),
-    entry(3, Some(Global::Dispatch), 64, Some(158)),
+    entry(2, Some(Global::Dispatch), 64, Some(155)),
+    entry(2, Some(Global::Dispatch), 64, Some(156)),
+    entry(2, Some(Global::Dispatch), 64, Some(157)),
+    entry(2, Some(Global::Dispatch), 64, Some(158)),
     entry(3, Some(Global::Dispatch), 64, Some(159)),
     entry(3, Some(Global::Dispatch), 64, Some(160)),
     entry(3, Some(Global::Dispatch), 64, Some(161)),
     entry(3, Some(Global::Dispatch), 64, Some(162)),
+    entry(3, Some(Global::Dispatch), 64, Some(163)),
+    entry(3, Some(Global::Dispatch), 64, Some(164)),
+    entry(3, Some(Global::Dispatch), 64, Some(165)),
+    entry(3, Some(Global::Dispatch), 64, Some(166)),
     entry(4, Some(Global::Dispatch), 64, None),
     entry(4, Some(Global::Dispatch), 64, None),
     entry(4, Some(Global::Dispatch), 64, None),
@@ -308,30 +324,30 @@ pub(crate) static ENTRIES: [Entry; 194] = [
     entry(2, Some(Global::Dispatch), 128, None),
     entry(2, Some(Global::Dispatch), 128, None),
     entry(2, Some(Global::Dispatch), 128, None),
-    entry(1, Some(Global::Dispatch), 64, Some(163)),
-    entry(1, Some(Global::Dispatch), 64, Some(164)),
-    entry(1, Some(Global::Dispatch), 64, Some(165)),
-    entry(1, Some(Global::Dispatch), 64, Some(166)),
     entry(1, Some(Global::Dispatch), 64, Some(167)),
     entry(1, Some(Global::Dispatch), 64, Some(168)),
     entry(1, Some(Global::Dispatch), 64, Some(169)),
     entry(1, Some(Global::Dispatch), 64, Some(170)),
-    entry(2, Some(Global::Dispatch), 64, Some(171)),
-    entry(2, Some(Global::Dispatch), 64, Some(172)),
-    entry(2, Some(Global::Dispatch), 64, Some(173)),
-    entry(2, Some(Global::Dispatch), 64, Some(174)),
+    entry(1, Some(Global::Dispatch), 64, Some(171)),
+    entry(1, Some(Global::Dispatch), 64, Some(172)),
+    entry(1, Some(Global::Dispatch), 64, Some(173)),
+    entry(1, Some(Global::Dispatch), 64, Some(174)),
     entry(2, Some(Global::Dispatch), 64, Some(175)),
     entry(2, Some(Global::Dispatch), 64, Some(176)),
     entry(2, Some(Global::Dispatch), 64, Some(177)),
     entry(2, Some(Global::Dispatch), 64, Some(178)),
-    entry(3, Some(Global::Dispatch), 64, Some(179)),
-    entry(3, Some(Global::Dispatch), 64, Some(180)),
-    entry(3, Some(Global::Dispatch), 64, Some(181)),
-    entry(3, Some(Global::Dispatch), 64, Some(182)),
+    entry(2, Some(Global::Dispatch), 64, Some(179)),
+    entry(2, Some(Global::Dispatch), 64, Some(180)),
+    entry(2, Some(Global::Dispatch), 64, Some(181)),
+    entry(2, Some(Global::Dispatch), 64, Some(182)),
     entry(3, Some(Global::Dispatch), 64, Some(183)),
     entry(3, Some(Global::Dispatch), 64, Some(184)),
     entry(3, Some(Global::Dispatch), 64, Some(185)),
     entry(3, Some(Global::Dispatch), 64, Some(186)),
+    entry(3, Some(Global::Dispatch), 64, Some(187)),
+    entry(3, Some(Global::Dispatch), 64, Some(188)),
+    entry(3, Some(Global::Dispatch), 64, Some(189)),
+    entry(3, Some(Global::Dispatch), 64, Some(190)),
     entry(4, Some(Global::Dispatch), 64, None),
     entry(4, Some(Global::Dispatch), 64, None),
     entry(4, Some(Global::Dispatch), 64, None),
@@ -364,19 +380,19 @@ pub(crate) static ENTRIES: [Entry; 194] = [
     entry(2, Some(Global::Dispatch), 128, None),
     entry(2, Some(Global::Dispatch), 128, None),
     entry(2, Some(Global::Dispatch), 128, None),
-    entry(6, Some(Global::Rows), 64, Some(187)),
-    entry(6, Some(Global::Rows), 64, Some(188)),
-    entry(7, Some(Global::Rows), 64, Some(189)),
+    entry(6, Some(Global::Rows), 64, Some(191)),
+    entry(6, Some(Global::Rows), 64, Some(192)),
+    entry(7, Some(Global::Rows), 64, Some(193)),
     entry(8, Some(Global::Dispatch), 64, None),
     entry(9, Some(Global::Dispatch), 64, None),
     entry(10, Some(Global::Dispatch), 64, None),
     entry(11, Some(Global::Dispatch), 64, None),
     entry(12, Some(Global::Dispatch), 64, None),
     entry(13, Some(Global::Dispatch), 64, None),
-    entry(14, Some(Global::Dispatch), 64, Some(190)),
-    entry(14, Some(Global::Dispatch), 64, Some(191)),
-    entry(14, Some(Global::Dispatch), 64, Some(192)),
-    entry(14, Some(Global::Dispatch), 64, Some(193)),
+    entry(14, Some(Global::Dispatch), 64, Some(194)),
+    entry(14, Some(Global::Dispatch), 64, Some(195)),
+    entry(14, Some(Global::Dispatch), 64, Some(196)),
+    entry(14, Some(Global::Dispatch), 64, Some(197)),
     entry(15, Some(Global::Dispatch), 64, None),
     entry(16, Some(Global::Dispatch), 64, None),
     entry(17, Some(Global::Dispatch), 64, None),
@@ -390,6 +406,10 @@ pub(crate) static ENTRIES: [Entry; 194] = [
     entry(22, Some(Global::Dispatch), 64, None),
     entry(23, Some(Global::Dispatch), 64, None),
     entry(24, Some(Global::Dispatch), 64, None),
+    entry(25, Some(Global::Dispatch), 64, None),
+    entry(26, Some(Global::Dispatch), 64, None),
+    entry(27, Some(Global::Dispatch), 64, None),
+    entry(28, Some(Global::Dispatch), 64, None),
     entry(1, Some(Global::Dispatch), 64, None),
     entry(1, Some(Global::Dispatch), 64, None),
     entry(1, Some(Global::Dispatch), 64, None),
@@ -647,6 +667,23 @@ pub(crate) struct MatrixRows<F> {
 stored!(MatrixRows, (<F>), 12, first 0, second 4, third 8);
 
 #[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct MotionSample {
+    pub(crate) clip: u32,
+    pub(crate) tick: u32,
+}
+
+stored!(MotionSample, (), 2, clip 0, tick 1);
+
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct MotionSpan<F> {
+    pub(crate) index: u32,
+    pub(crate) parameter: F,
+    pub(crate) rate: F,
+}
+
+stored!(MotionSpan, (<F>), 3, index 0, parameter 1, rate 2);
+
+#[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct PolynomialSegment<F> {
     pub(crate) coefficients: [[F; 4]; 11],
 }
@@ -692,13 +729,20 @@ pub(crate) struct Spread {
     pub(crate) item_count: u32,
     pub(crate) first_output: u32,
     pub(crate) lanes_log2: u32,
+    pub(crate) sample_mask: u32,
+    pub(crate) track_mask: u32,
+    pub(crate) step: u32,
+    pub(crate) step_log2: u32,
+    pub(crate) stride: u32,
     pub(crate) line_mask: u32,
+    pub(crate) repetitions: u32,
+    pub(crate) layer_repetitions: u32,
     pub(crate) segments: u32,
     pub(crate) constants: u32,
     pub(crate) outputs: u32,
 }
 
-stored!(Spread, (), 9, detail 0, first_item 1, item_count 2, first_output 3, lanes_log2 4, line_mask 5, segments 6, constants 7, outputs 8);
+stored!(Spread, (), 16, detail 0, first_item 1, item_count 2, first_output 3, lanes_log2 4, sample_mask 5, track_mask 6, step 7, step_log2 8, stride 9, line_mask 10, repetitions 11, layer_repetitions 12, segments 13, constants 14, outputs 15);
 
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct SpreadRun<F> {
@@ -739,6 +783,42 @@ pub(crate) struct TwoKeysHoisted<F> {
 }
 
 stored!(TwoKeysHoisted, (<F>), 1, parameter 0);
+
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct ValueAndSlope<F> {
+    pub(crate) value: [F; 4],
+    pub(crate) slope: [F; 4],
+}
+
+stored!(ValueAndSlope, (<F>), 8, value 0, slope 4);
+
+/// The angle of the point (along, up), neither of which is negative, from 0 to pi/2; 0 for (0, 0).
+pub(crate) fn acute_arc_tangent<M: Machine>(machine: &M, up: M::F, along: M::F) -> M::F {
+    let _block = machine.block(line!(), 34);
+    let steep = up > along;
+    let large = if steep { up } else { along };
+    let small = if steep { along } else { up };
+    let divisor = if large == M::F::of(0.0) {
+        M::F::of(1.0)
+    } else {
+        large
+    };
+    let inverse = reciprocal(machine, divisor);
+    let near = small * inverse;
+    let t = near + (small - near * divisor) * inverse;
+    let z = t * t;
+    let high =
+        (((M::F::of(ARC_8) * z + M::F::of(ARC_7)) * z + M::F::of(ARC_6)) * z + M::F::of(ARC_5)) * z
+            + M::F::of(ARC_4);
+    let tail = (((high * z + M::F::of(ARC_3)) * z + M::F::of(ARC_2)) * z + M::F::of(ARC_1)) * z
+        + M::F::of(ARC_0);
+    let flat = tail * (z * t) + t;
+    if steep {
+        (M::F::of(HALF_PI) - flat) + M::F::of(HALF_PI_LOW)
+    } else {
+        flat
+    }
+}
 
 pub(crate) fn arc_between<M: Machine>(
     machine: &M,
@@ -786,32 +866,10 @@ pub(crate) fn arc_between<M: Machine>(
 
 /// The angle of the point (x, y), from -pi to pi; 0 for (0, 0).
 pub(crate) fn arc_tangent<M: Machine>(machine: &M, y: M::F, x: M::F) -> M::F {
-    let _block = machine.block(line!(), 43);
-    let up = magnitude(machine, y);
-    let along = magnitude(machine, x);
-    let steep = up > along;
-    let large = if steep { up } else { along };
-    let small = if steep { along } else { up };
-    let divisor = if large == M::F::of(0.0) {
-        M::F::of(1.0)
-    } else {
-        large
-    };
-    let inverse = reciprocal(machine, divisor);
-    let near = small * inverse;
-    let t = near + (small - near * divisor) * inverse;
-    let z = t * t;
-    let high =
-        (((M::F::of(ARC_8) * z + M::F::of(ARC_7)) * z + M::F::of(ARC_6)) * z + M::F::of(ARC_5)) * z
-            + M::F::of(ARC_4);
-    let tail = (((high * z + M::F::of(ARC_3)) * z + M::F::of(ARC_2)) * z + M::F::of(ARC_1)) * z
-        + M::F::of(ARC_0);
-    let flat = tail * (z * t) + t;
-    let acute = if steep {
-        (M::F::of(HALF_PI) - flat) + M::F::of(HALF_PI_LOW)
-    } else {
-        flat
-    };
+    let _block = machine.block(line!(), 10);
+    let result = magnitude(machine, y);
+    let result_2 = magnitude(machine, x);
+    let acute = acute_arc_tangent(machine, result, result_2);
     let obtuse = if x < M::F::of(0.0) {
         (M::F::of(PI) - acute) + M::F::of(PI_LOW)
     } else {
@@ -921,6 +979,12 @@ pub(crate) fn canonical<M: Machine>(machine: &M, q: [M::F; 4]) -> [M::F; 4] {
     )
 }
 
+pub(crate) fn canonical3<M: Machine>(machine: &M, v: [M::F; 3]) -> [M::F; 4] {
+    let _block = machine.block(line!(), 1);
+    let result = canonical(machine, [v[0], v[1], v[2], M::F::of(0.0)]);
+    result
+}
+
 /// The Hamilton product of m and \[v, w].
 pub(crate) fn canonical_product<M: Machine>(
     machine: &M,
@@ -942,14 +1006,14 @@ pub(crate) fn canonical_product<M: Machine>(
 }
 
 pub(crate) fn cell_at<M: Machine>(machine: &M, index: u32) -> [M::F; 4] {
-    const OF_KERNELS: [u8; 194] = [
+    const OF_KERNELS: [u8; 198] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1,
     ];
     match OF_KERNELS[machine.code()] {
         0 => cell_at_of_readers(machine, index),
@@ -993,14 +1057,14 @@ pub(crate) fn cell_of<M: Machine>(machine: &M, corner: Corner, iteration: u32) -
 }
 
 pub(crate) fn channel_at<M: Machine>(machine: &M, index: u32) -> CrowdChannel {
-    const OF_KERNELS: [u8; 194] = [
+    const OF_KERNELS: [u8; 198] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1,
     ];
     match OF_KERNELS[machine.code()] {
         0 => channel_at_of_readers(machine, index),
@@ -1059,14 +1123,14 @@ pub(crate) fn composed<M: Machine>(
 }
 
 pub(crate) fn constant_at<M: Machine>(machine: &M, index: u32) -> [M::F; 4] {
-    const OF_KERNELS: [u8; 194] = [
+    const OF_KERNELS: [u8; 198] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1,
         1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
-        1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0,
+        1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => constant_at_of_readers(machine, index),
@@ -1105,7 +1169,7 @@ pub(crate) fn constant_of_polynomial_segment<M: Machine>(
 /// A constant of a run, in a repetition.
 pub(crate) fn constant_of_run<M: Machine>(machine: &M, index: u32, repetition: u32) -> [M::F; 4] {
     let _block = machine.block(line!(), 4);
-    let loaded = machine.load::<u32>(Global::Dispatch, 7);
+    let loaded = machine.load::<u32>(Global::Dispatch, 14);
     let result = constant_at(machine, index.wrapping_add(repetition.wrapping_mul(loaded)));
     result
 }
@@ -1189,6 +1253,8 @@ pub(crate) fn corner_of<M: Machine>(
     }
 }
 
+/// Products of vectors, in a fixed order of operations.
+/// Twin: src/math/quaternion.rs.
 pub(crate) fn cross3<M: Machine>(machine: &M, a: [M::F; 3], b: [M::F; 3]) -> [M::F; 3] {
     let _block = machine.block(line!(), 9);
     [
@@ -1199,14 +1265,14 @@ pub(crate) fn cross3<M: Machine>(machine: &M, a: [M::F; 3], b: [M::F; 3]) -> [M:
 }
 
 pub(crate) fn crowd_work<M: Machine>(machine: &M, index: u32) {
-    const OF_KERNELS: [u8; 194] = [
+    const OF_KERNELS: [u8; 198] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 1, 1, 2, 3, 4, 5, 0, 6, 7, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1,
     ];
     match OF_KERNELS[machine.code()] {
         0 => crowd_work_of_rotations(machine, index),
@@ -1480,14 +1546,14 @@ pub(crate) fn cubic_value<M: Machine>(
 }
 
 pub(crate) fn distance_at<M: Machine>(machine: &M, index: u32) -> M::F {
-    const OF_KERNELS: [u8; 194] = [
+    const OF_KERNELS: [u8; 198] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1,
-        1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1,
+        1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => distance_at_of_readers(machine, index),
@@ -1513,14 +1579,14 @@ pub(crate) fn distance_at_of_readers_2<M: Machine>(machine: &M, index: u32) -> M
 }
 
 pub(crate) fn distance_from_middle<M: Machine>(machine: &M, first: i32, j: u32) -> M::F {
-    const OF_KERNELS: [u8; 194] = [
+    const OF_KERNELS: [u8; 198] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0,
         0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1,
         1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1,
-        1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1,
+        1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => distance_from_middle_of_frame_distance(machine, first, j),
@@ -1563,14 +1629,14 @@ pub(crate) fn dot4<M: Machine>(machine: &M, a: [M::F; 4], b: [M::F; 4]) -> M::F 
 }
 
 pub(crate) fn entry_at<M: Machine>(machine: &M, index: u32) -> CrowdEntry {
-    const OF_KERNELS: [u8; 194] = [
+    const OF_KERNELS: [u8; 198] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 2, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 2, 2, 2, 2,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 2, 2, 2, 2,
     ];
     match OF_KERNELS[machine.code()] {
         0 => entry_at_of_readers(machine, index),
@@ -1607,7 +1673,7 @@ pub(crate) fn entry_at_of_readers_2<M: Machine>(machine: &M, index: u32) -> Crow
 pub(crate) fn euler<M: Machine>(machine: &M, rotation: [M::F; 4], detail: u32) -> [M::F; 3] {
     let mut condition: bool = Default::default();
     let mut condition_2: bool = Default::default();
-    let _block = machine.block(line!(), 71);
+    let _block = machine.block(line!(), 70);
     let symmetric = detail & SYMMETRIC != 0u32;
     let intrinsic = detail & INTRINSIC != 0u32;
     let sign = if detail & NEGATIVE != 0u32 {
@@ -1673,7 +1739,7 @@ pub(crate) fn euler<M: Machine>(machine: &M, rotation: [M::F; 4], detail: u32) -
     }
     let loaded = condition_2;
     let first = if loaded { outer * third_sign } else { outer };
-    let result = arc_tangent(machine, sine, cosine);
+    let result = acute_arc_tangent(machine, sine, cosine);
     let whole = M::F::of(2.0) * result;
     let second = if symmetric {
         whole
@@ -1681,12 +1747,11 @@ pub(crate) fn euler<M: Machine>(machine: &M, rotation: [M::F; 4], detail: u32) -
         (whole - M::F::of(HALF_PI)) - M::F::of(HALF_PI_LOW)
     };
     let result_2 = wrapped(machine, first);
-    let result_3 = wrapped(machine, second);
-    let result_4 = wrapped(machine, inner);
+    let result_3 = wrapped(machine, inner);
     [
         result_2 * M::F::of(DEGREES),
+        second * M::F::of(DEGREES),
         result_3 * M::F::of(DEGREES),
-        result_4 * M::F::of(DEGREES),
     ]
 }
 
@@ -1702,31 +1767,33 @@ pub(crate) fn evaluate_arc_segment<M: Machine>(
     result_2
 }
 
-/// The value at the `j`th sample of a run that needs no care and has no key there. `constant` is its segment's.
+/// The value at a sample of a run that needs no care and has no key there. `at` is the run's `first` for this sample, and
+/// `constant` its segment's.
 pub(crate) fn evaluate_near_arc_segment<M: Machine>(
     machine: &M,
     item: SpreadRun<M::F>,
     segment: ArcSegment<M::F>,
     constant: M::F,
-    j: u32,
+    at: i32,
 ) -> [M::F; 4] {
     let _block = machine.block(line!(), 4);
-    let result = near_distance(machine, item.first, j);
+    let result = near_distance(machine, at);
     let parameter = result * item.scale + item.offset;
     let result_2 = evaluate_with_arc_segment(machine, segment, constant, parameter);
     result_2
 }
 
-/// The value at the `j`th sample of a run that needs no care and has no key there. `constant` is its segment's.
+/// The value at a sample of a run that needs no care and has no key there. `at` is the run's `first` for this sample, and
+/// `constant` its segment's.
 pub(crate) fn evaluate_near_polynomial_segment<M: Machine>(
     machine: &M,
     item: SpreadRun<M::F>,
     segment: PolynomialSegment<M::F>,
     constant: M::F,
-    j: u32,
+    at: i32,
 ) -> [M::F; 4] {
     let _block = machine.block(line!(), 4);
-    let result = near_distance(machine, item.first, j);
+    let result = near_distance(machine, at);
     let parameter = result * item.scale + item.offset;
     let result_2 = evaluate_with_polynomial_segment(machine, segment, constant, parameter);
     result_2
@@ -1772,6 +1839,26 @@ pub(crate) fn evaluate_with_polynomial_segment<M: Machine>(
     let _block = machine.block(line!(), 1);
     let result = evaluate_polynomial_segment(machine, segment, parameter);
     result
+}
+
+/// √x, rounded to nearest, for x from 2^-30 to 1, and for 0.
+pub(crate) fn exact_root<M: Machine>(machine: &M, x: M::F) -> M::F {
+    let _block = machine.block(line!(), 19);
+    if x == M::F::of(0.0) {
+        return M::F::of(0.0);
+    }
+    let near = root(machine, x);
+    let next = M::F::of_bits(near.bits().wrapping_add(1u32));
+    let before = M::F::of_bits(near.bits().wrapping_sub(1u32));
+    let result = rest_of_square(machine, x, near, (next - near) * M::F::of(0.5));
+    let is_more = result > M::F::of(0.0);
+    let result_2 = rest_of_square(machine, x, near, (before - near) * M::F::of(0.5));
+    let is_less = result_2 < M::F::of(0.0);
+    if is_more {
+        next
+    } else {
+        if is_less { before } else { near }
+    }
 }
 
 /// Finds the position in a time base of a layer of the workgroup's instances, as `crowd/times` does.
@@ -1864,14 +1951,14 @@ pub(crate) async fn finish_2<M: Machine>(
     rotation: [M::F; 4],
     is_stored: bool,
 ) {
-    const OF_KERNELS: [u8; 194] = [
+    const OF_KERNELS: [u8; 198] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 2,
         3, 0, 1, 0, 1, 0, 0, 2, 3, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 2, 3, 0, 1, 0,
         1, 0, 0, 2, 3, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => finish_2_of_alone(machine, lane, index, rotation, is_stored).await,
@@ -2078,6 +2165,80 @@ pub(crate) fn flushed4<M: Machine>(machine: &M, q: [M::F; 4]) -> [M::F; 4] {
     [result, result_2, result_3, result_4]
 }
 
+/// Converts a joint's state from its parent's frame to the world.
+pub(crate) fn hang_on<M: Machine>(machine: &M, parent: u32, child: u32) {
+    let _block = machine.block(line!(), 26);
+    let above = machine.load::<[M::F; 4]>(
+        Global::States,
+        4 * (parent.wrapping_add(WORLD_ROTATION) as usize),
+    );
+    let loaded =
+        machine.load::<[M::F; 4]>(Global::States, 4 * (child.wrapping_add(POSITION) as usize));
+    let arm = rotated(machine, above, [loaded[0], loaded[1], loaded[2]]);
+    let loaded_2 =
+        machine.load::<[M::F; 4]>(Global::States, 4 * (parent.wrapping_add(POSITION) as usize));
+    let result = canonical3(
+        machine,
+        both([loaded_2[0], loaded_2[1], loaded_2[2]], arm, |x, y| x + y),
+    );
+    machine.store::<[M::F; 4]>(
+        Global::States,
+        4 * (child.wrapping_add(POSITION) as usize),
+        result,
+    );
+    let loaded_3 = machine.load::<[M::F; 4]>(
+        Global::States,
+        4 * (child.wrapping_add(WORLD_ROTATION) as usize),
+    );
+    let rotation = product(machine, above, loaded_3);
+    let result_2 = dot4(machine, rotation, rotation);
+    let scale = M::F::of(1.5) - M::F::of(0.5) * result_2;
+    let result_3 = canonical(machine, both(rotation, [scale; 4], |x, y| x * y));
+    machine.store::<[M::F; 4]>(
+        Global::States,
+        4 * (child.wrapping_add(WORLD_ROTATION) as usize),
+        result_3,
+    );
+    let loaded_4 = machine.load::<u32>(Global::Dispatch, 4);
+    if loaded_4 != 0u32 {
+        let _block = machine.block(line!(), 24);
+        let loaded_5 = machine.load::<[M::F; 4]>(
+            Global::States,
+            4 * (parent.wrapping_add(ANGULAR_VELOCITY) as usize),
+        );
+        let angular_above = [loaded_5[0], loaded_5[1], loaded_5[2]];
+        let loaded_6 =
+            machine.load::<[M::F; 4]>(Global::States, 4 * (parent.wrapping_add(VELOCITY) as usize));
+        let result_4 = cross3(machine, angular_above, arm);
+        let carried = both([loaded_6[0], loaded_6[1], loaded_6[2]], result_4, |x, y| {
+            x + y
+        });
+        let loaded_7 =
+            machine.load::<[M::F; 4]>(Global::States, 4 * (child.wrapping_add(VELOCITY) as usize));
+        let velocity = rotated(machine, above, [loaded_7[0], loaded_7[1], loaded_7[2]]);
+        let result_5 = canonical3(machine, both(carried, velocity, |x, y| x + y));
+        machine.store::<[M::F; 4]>(
+            Global::States,
+            4 * (child.wrapping_add(VELOCITY) as usize),
+            result_5,
+        );
+        let loaded_8 = machine.load::<[M::F; 4]>(
+            Global::States,
+            4 * (child.wrapping_add(ANGULAR_VELOCITY) as usize),
+        );
+        let angular = rotated(machine, above, [loaded_8[0], loaded_8[1], loaded_8[2]]);
+        let result_6 = canonical3(machine, both(angular_above, angular, |x, y| x + y));
+        machine.store::<[M::F; 4]>(
+            Global::States,
+            4 * (child.wrapping_add(ANGULAR_VELOCITY) as usize),
+            result_6,
+        );
+        return;
+    } else {
+        return;
+    }
+}
+
 /// Whether a position is one of an item's samples.
 pub(crate) fn has<M: Machine>(machine: &M, item: Item<M::F>, position: u32) -> bool {
     let _block = machine.block(line!(), 3);
@@ -2210,14 +2371,14 @@ pub(crate) async fn is_any<M: Machine>(machine: &M, condition: bool) -> bool {
 }
 
 pub(crate) fn item_at_item<M: Machine>(machine: &M, index: u32) -> Item<M::F> {
-    const OF_KERNELS: [u8; 194] = [
+    const OF_KERNELS: [u8; 198] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
-        1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1,
+        1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
+        1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => item_at_item_of_readers(machine, index),
@@ -2290,10 +2451,51 @@ pub(crate) fn item_of<M: Machine>(machine: &M, cell: Cell) -> u32 {
         .wrapping_add((block.starts << (!cell.position & 31u32)).count_ones())
 }
 
+/// The key at the end of a span. The last span is constant: its key is at both ends.
+pub(crate) fn key_after<M: Machine>(
+    machine: &M,
+    channel: CrowdChannel,
+    base: CrowdBase,
+    span: u32,
+) -> [M::F; 4] {
+    let _block = machine.block(line!(), 5);
+    let result = key_of(
+        machine,
+        channel,
+        if span.wrapping_add(1u32) == base.count {
+            span
+        } else {
+            span.wrapping_add(1u32)
+        },
+    );
+    result
+}
+
 pub(crate) fn key_at<M: Machine>(machine: &M, index: u32) -> [u32; 4] {
     let _block = machine.block(line!(), 1);
     let loaded = machine.load::<[u32; 4]>(Global::Keys, 4 * (index as usize));
     loaded
+}
+
+/// The key at the start of a span, of a channel that consists of keys.
+pub(crate) fn key_of<M: Machine>(machine: &M, channel: CrowdChannel, span: u32) -> [M::F; 4] {
+    let _block = machine.block(line!(), 6);
+    let index = channel.first.wrapping_add(span.wrapping_mul(channel.count));
+    if channel.form_and_base >> 24u32 == FORM_PACKED {
+        let _block = machine.block(line!(), 8);
+        let words = machine.load::<[u32; 4]>(Global::Cells, 4 * ((index >> 1u32) as usize));
+        let result = unpacked(
+            machine,
+            if index & 1u32 == 1u32 {
+                [words[2], words[3]]
+            } else {
+                [words[0], words[1]]
+            },
+        );
+        return result;
+    }
+    let result_2 = cell_at(machine, index);
+    result_2
 }
 
 /// A rotation, a translation or a scale under the next layer. For scales `reference` holds reciprocals.
@@ -2401,14 +2603,14 @@ pub(crate) fn layer_value<M: Machine>(
 }
 
 pub(crate) fn layered<M: Machine>(machine: &M, instance: u32, joint: u32, kind: u32) -> [M::F; 4] {
-    const OF_KERNELS: [u8; 194] = [
+    const OF_KERNELS: [u8; 198] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 1, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 1,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 1,
     ];
     match OF_KERNELS[machine.code()] {
         0 => layered_of_layers(machine, instance, joint, kind),
@@ -2522,19 +2724,42 @@ pub(crate) fn layered_of_plain<M: Machine>(
     result_3
 }
 
+/// The middle of a line, and its rise. Halves are added, so that no sum is too large.
+pub(crate) fn line_between<M: Machine>(
+    machine: &M,
+    start: [M::F; 4],
+    end: [M::F; 4],
+) -> ValueAndSlope<M::F> {
+    let _block = machine.block(line!(), 6);
+    let result = canonical(
+        machine,
+        both(
+            both(start, [M::F::of(0.5); 4], |x, y| x * y),
+            both(end, [M::F::of(0.5); 4], |x, y| x * y),
+            |x, y| x + y,
+        ),
+    );
+    let result_2 = canonical(machine, both(end, start, |x, y| x - y));
+    ValueAndSlope {
+        value: result,
+        slope: result_2,
+    }
+}
+
 /// Where a run of a repetition finds its segment (x) and its key (z), and stores its first sample (y).
 pub(crate) fn location_of<M: Machine>(
     machine: &M,
     item: SpreadRun<M::F>,
     repetition: u32,
 ) -> [u32; 3] {
-    let _block = machine.block(line!(), 7);
-    let loaded = machine.load::<u32>(Global::Dispatch, 6);
-    let loaded_2 = machine.load::<u32>(Global::Dispatch, 8);
-    let loaded_3 = machine.load::<u32>(Global::Dispatch, 7);
-    let steps = [loaded, loaded_2, loaded_3];
-    let loaded_4 = machine.load::<u32>(Global::Dispatch, 3);
-    let listed = [item.source, item.output.wrapping_add(loaded_4), item.key];
+    let _block = machine.block(line!(), 4);
+    let all = machine.load::<Spread>(Global::Dispatch, 0);
+    let steps = [all.segments, all.outputs, all.constants];
+    let listed = [
+        item.source,
+        item.output.wrapping_add(all.first_output),
+        item.key,
+    ];
     both(
         listed,
         both([repetition; 3], steps, |x, y| x.wrapping_mul(y)),
@@ -2548,15 +2773,15 @@ pub(crate) fn magnitude<M: Machine>(machine: &M, x: M::F) -> M::F {
 }
 
 pub(crate) async fn main<M: Machine>(machine: &M) {
-    const OF_KERNELS: [u8; 194] = [
+    const OF_KERNELS: [u8; 198] = [
         0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 2, 2, 2, 2, 2, 2, 2, 2, 3, 3, 3, 3, 3,
         3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 4, 5, 4, 4, 6, 7, 4, 5, 4, 5, 4, 4, 6, 7, 4, 5, 8, 8, 8,
         8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 9, 9, 9, 9, 9, 9, 9, 9, 10, 10, 10, 10, 10, 10, 10,
         10, 10, 10, 10, 10, 10, 10, 10, 10, 11, 12, 11, 11, 13, 14, 11, 12, 11, 12, 11, 11, 13, 14,
         11, 12, 15, 16, 17, 18, 18, 18, 18, 18, 18, 19, 19, 19, 19, 19, 19, 19, 19, 20, 19, 19, 21,
-        21, 22, 22, 23, 24, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 2, 2, 2, 2, 2, 2, 2, 2,
-        8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 9, 9, 9, 9, 9, 9, 9, 9, 15, 16, 17, 19, 19,
-        19, 19,
+        21, 22, 22, 23, 24, 24, 24, 24, 25, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 2, 2,
+        2, 2, 2, 2, 2, 2, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 9, 9, 9, 9, 9, 9, 9, 9,
+        15, 16, 17, 19, 19, 19, 19,
     ];
     match OF_KERNELS[machine.code()] {
         0 => main_of_self_test(machine).await,
@@ -2583,6 +2808,7 @@ pub(crate) async fn main<M: Machine>(machine: &M) {
         21 => main_of_whole_rotations(machine).await,
         22 => main_of_whole_matrices(machine).await,
         23 => main_of_subgroup_rotations(machine).await,
+        24 => main_of_motion(machine).await,
         _ => main_of_prepare_arcs(machine).await,
     }
 }
@@ -2774,88 +3000,102 @@ pub(crate) async fn main_of_coalesced<M: Machine>(machine: &M) {
 
 pub(crate) async fn main_of_alone<M: Machine>(machine: &M) {
     let group = machine.ids().workgroup_id;
-    let groups = machine.ids().num_workgroups;
     let invocation = machine.ids().local_invocation_index;
-    let mut rotation: [M::F; 4] = Default::default();
-    let mut j: u32 = Default::default();
-    let mut pairs: u32 = Default::default();
-    let _block = machine.block(line!(), 38);
-    let lanes_log2 = machine.load::<u32>(Global::Dispatch, 4);
-    let lanes = 1u32 << lanes_log2;
-    let workgroup = group[1].wrapping_mul(groups[0]).wrapping_add(group[0]);
-    let index = workgroup
+    let mut at: i32 = Default::default();
+    let _block = machine.block(line!(), 47);
+    let all = machine.load::<Spread>(Global::Dispatch, 0);
+    let index = group[0]
         .wrapping_mul(SPREAD_WORKGROUP)
         .wrapping_add(invocation)
-        >> lanes_log2;
-    let loaded = machine.load::<u32>(Global::Dispatch, 2);
-    if index >= loaded {
+        >> all.lanes_log2;
+    let repetition = group[2]
+        .wrapping_mul(all.layer_repetitions)
+        .wrapping_add(invocation & all.track_mask);
+    if (index >= all.item_count) | (repetition >= all.repetitions) {
         return;
     }
-    let loaded_2 = machine.load::<u32>(Global::Dispatch, 1);
-    let item = item_at_spread_run(machine, loaded_2.wrapping_add(index));
-    let location = location_of(machine, item, group[2]);
+    let item = item_at_spread_run(machine, all.first_item.wrapping_add(index));
+    let location = location_of(machine, item, repetition);
     let first = location[1];
-    let loaded_3 = machine.load::<u32>(Global::Dispatch, 5);
-    let idle = first & loaded_3;
-    let first_j = (invocation & lanes.wrapping_sub(1u32)).wrapping_sub(idle);
+    let idle = first & all.line_mask;
+    let first_j = (invocation & all.sample_mask).wrapping_sub(idle);
     if item.count >= NEEDS_CARE {
         let _block = machine.block(line!(), 1);
-        store_with_care(machine, item, location, first_j, lanes, group[2]);
+        store_with_care(machine, item, location, first_j, repetition);
         return;
     }
     let count = item.count;
     let segment = segment_at_arc_segment(machine, location[0]);
     let constant = constant_of_arc_segment(machine, segment);
+    let first_at = item.first.wrapping_add(first_j as i32);
     if first_j < count {
-        let _block = machine.block(line!(), 9);
-        let result = evaluate_near_arc_segment(machine, item, segment, constant, first_j);
-        rotation = result;
+        let _block = machine.block(line!(), 4);
         if (first_j == 0u32) & (item.key != NO_KEY) {
             let _block = machine.block(line!(), 2);
-            let result_2 = constant_at(machine, location[2]);
-            rotation = result_2;
+            let result = constant_at(machine, location[2]);
+            store(machine, first, result);
+        } else {
+            let _block = machine.block(line!(), 3);
+            let result_2 = evaluate_near_arc_segment(machine, item, segment, constant, first_at);
+            store(machine, first.wrapping_add(first_j), result_2);
         }
-        let loaded_4 = rotation;
-        store(machine, first.wrapping_add(first_j), loaded_4);
     }
-    j = first_j.wrapping_add(lanes);
-    pairs = (count.wrapping_add(idle) >> lanes_log2).wrapping_add(1u32) >> 1u32;
-    let loaded_5 = pairs;
-    if loaded_5 > 1u32 {
+    let base = first.wrapping_sub((item.first as u32).wrapping_mul(all.stride));
+    let step = all.step as i32;
+    let end = item.first.wrapping_add(count as i32);
+    at = first_at.wrapping_add(step);
+    let full = count.wrapping_add(idle) >> all.step_log2;
+    let loaded = at;
+    let pairs_end =
+        loaded.wrapping_add(((full.wrapping_sub(1u32) & 0xfffffffeu32) << all.step_log2) as i32);
+    let loaded_2 = at;
+    if loaded_2 < pairs_end {
+        let _block = machine.block(line!(), 1);
         loop {
-            let _block = machine.block(line!(), 22);
-            let loaded_6 = j;
-            let loaded_7 = j;
-            let result_3 = evaluate_near_arc_segment(machine, item, segment, constant, loaded_7);
-            store(machine, first.wrapping_add(loaded_6), result_3);
-            let loaded_8 = j;
-            j = loaded_8.wrapping_add(lanes);
-            let loaded_9 = j;
-            let loaded_10 = j;
-            let result_4 = evaluate_near_arc_segment(machine, item, segment, constant, loaded_10);
-            store(machine, first.wrapping_add(loaded_9), result_4);
-            let loaded_11 = j;
-            j = loaded_11.wrapping_add(lanes);
-            let loaded_12 = pairs;
-            pairs = loaded_12.wrapping_sub(1u32);
-            let loaded_13 = pairs;
-            if loaded_13 <= 1u32 {
+            let _block = machine.block(line!(), 23);
+            let loaded_3 = at;
+            let loaded_4 = at;
+            let result_3 = evaluate_near_arc_segment(machine, item, segment, constant, loaded_4);
+            store(
+                machine,
+                base.wrapping_add((loaded_3 as u32).wrapping_mul(all.stride)),
+                result_3,
+            );
+            let loaded_5 = at;
+            at = loaded_5.wrapping_add(step);
+            let loaded_6 = at;
+            let loaded_7 = at;
+            let result_4 = evaluate_near_arc_segment(machine, item, segment, constant, loaded_7);
+            store(
+                machine,
+                base.wrapping_add((loaded_6 as u32).wrapping_mul(all.stride)),
+                result_4,
+            );
+            let loaded_8 = at;
+            at = loaded_8.wrapping_add(step);
+            let loaded_9 = at;
+            if loaded_9 >= pairs_end {
                 break;
             }
         }
+        at = pairs_end;
     }
-    let loaded_14 = j;
-    if loaded_14 < count {
+    let loaded_10 = at;
+    if loaded_10 < end {
         loop {
-            let _block = machine.block(line!(), 11);
-            let loaded_15 = j;
-            let loaded_16 = j;
-            let result_5 = evaluate_near_arc_segment(machine, item, segment, constant, loaded_16);
-            store(machine, first.wrapping_add(loaded_15), result_5);
-            let loaded_17 = j;
-            j = loaded_17.wrapping_add(lanes);
-            let loaded_18 = j;
-            if loaded_18 >= count {
+            let _block = machine.block(line!(), 13);
+            let loaded_11 = at;
+            let loaded_12 = at;
+            let result_5 = evaluate_near_arc_segment(machine, item, segment, constant, loaded_12);
+            store(
+                machine,
+                base.wrapping_add((loaded_11 as u32).wrapping_mul(all.stride)),
+                result_5,
+            );
+            let loaded_13 = at;
+            at = loaded_13.wrapping_add(step);
+            let loaded_14 = at;
+            if loaded_14 >= end {
                 break;
             }
         }
@@ -2867,181 +3107,207 @@ pub(crate) async fn main_of_alone<M: Machine>(machine: &M) {
 
 pub(crate) async fn main_of_together<M: Machine>(machine: &M) {
     let group = machine.ids().workgroup_id;
-    let groups = machine.ids().num_workgroups;
     let invocation = machine.ids().local_invocation_index;
     let mut item: SpreadRun<M::F> = Default::default();
-    let mut begin: u32 = 0u32;
-    let mut end: u32 = Default::default();
+    let mut first_j: u32 = Default::default();
     let mut iteration: u32 = 0u32;
     let mut rotation: [M::F; 4] = Default::default();
-    let mut all: [M::F; 3] = Default::default();
+    let mut all_parts: [M::F; 3] = Default::default();
     let mut part: u32 = Default::default();
     let mut part_2: u32 = Default::default();
+    let mut end_lane: u32 = Default::default();
     let mut part_3: u32 = Default::default();
-    let _block = machine.block(line!(), 41);
-    let loaded = machine.load::<u32>(Global::Dispatch, 4);
-    let lanes = 1u32 << loaded;
-    let workgroup = group[1].wrapping_mul(groups[0]).wrapping_add(group[0]);
-    let loaded_2 = machine.load::<u32>(Global::Dispatch, 4);
-    let first_index = workgroup.wrapping_mul(SPREAD_WORKGROUP >> loaded_2);
-    let loaded_3 = machine.load::<u32>(Global::Dispatch, 2);
-    if first_index >= loaded_3 {
+    let _block = machine.block(line!(), 58);
+    let all = machine.load::<Spread>(Global::Dispatch, 0);
+    let lanes = 1u32 << all.lanes_log2;
+    let first_index = group[0].wrapping_mul(SPREAD_WORKGROUP >> all.lanes_log2);
+    if first_index >= all.item_count {
         return;
     }
-    let loaded_4 = machine.load::<u32>(Global::Dispatch, 1);
-    let result = item_at_spread_run(machine, loaded_4.wrapping_add(first_index));
+    let result = item_at_spread_run(machine, all.first_item.wrapping_add(first_index));
     let iterations = result.iterations;
-    let loaded_5 = machine.load::<u32>(Global::Dispatch, 4);
-    let index = first_index.wrapping_add(invocation >> loaded_5);
-    let loaded_6 = machine.load::<u32>(Global::Dispatch, 2);
-    if index < loaded_6 {
-        let _block = machine.block(line!(), 4);
-        let loaded_7 = machine.load::<u32>(Global::Dispatch, 1);
-        let result_2 = item_at_spread_run(machine, loaded_7.wrapping_add(index));
+    let index = first_index.wrapping_add(invocation >> all.lanes_log2);
+    if index < all.item_count {
+        let _block = machine.block(line!(), 3);
+        let result_2 = item_at_spread_run(machine, all.first_item.wrapping_add(index));
         item = result_2;
     }
-    let loaded_8 = item;
-    let location = location_of(machine, loaded_8, group[2]);
-    let loaded_9 = item.count;
-    let segment = segment_at_arc_segment(
-        machine,
-        if loaded_9 & IS_CONSTANT != 0u32 {
-            0u32
-        } else {
-            location[0]
-        },
-    );
+    let first_repetition = group[2].wrapping_mul(all.layer_repetitions);
+    let repetition = first_repetition.wrapping_add(invocation & all.track_mask);
+    let is_there = repetition < all.repetitions;
+    let loaded = item;
+    let location = location_of(machine, loaded, repetition);
+    let loaded_2 = item.count;
+    let has_segment = is_there & (loaded_2 & IS_CONSTANT == 0u32);
+    let segment = segment_at_arc_segment(machine, if has_segment { location[0] } else { 0u32 });
     let constant = constant_of_arc_segment(machine, segment);
-    let loaded_10 = item;
-    let count = sample_count(machine, loaded_10);
-    let first = location[1];
-    let loaded_11 = machine.load::<u32>(Global::Dispatch, 5);
-    let idle = first & loaded_11;
+    let loaded_3 = item;
+    let count = sample_count(machine, loaded_3);
+    let lane_count = if is_there { count } else { 0u32 };
+    let tracks = all.repetitions.wrapping_sub(first_repetition);
+    let used_lanes = if (all.track_mask != 0u32) & (tracks < lanes) {
+        tracks
+    } else {
+        lanes
+    };
     let lane = invocation & lanes.wrapping_sub(1u32);
+    let run_values = invocation.wrapping_sub(lane).wrapping_mul(3u32);
     let lane_part = (lane & 0xfffffff8u32)
         .wrapping_mul(3u32)
         .wrapping_add(lane & 7u32);
-    let line_lanes = if lanes >= LINE { lanes } else { 0u32 };
-    end = lanes.wrapping_sub(idle);
+    let first = location[1].wrapping_sub((invocation & all.track_mask).wrapping_mul(all.outputs));
+    let first_part = first.wrapping_mul(3u32).wrapping_add(lane_part);
+    let stride = all.stride.wrapping_mul(3u32);
+    let fills_lines = (lanes >= LINE) & (used_lanes == lanes) & (count > all.sample_mask);
+    let filling = if fills_lines {
+        count.wrapping_sub(all.sample_mask)
+    } else {
+        0u32
+    };
+    let sample_lane = invocation & all.sample_mask;
+    first_j = 0u32.wrapping_sub(first & all.line_mask);
     loop {
-        let _block = machine.block(line!(), 30);
-        let loaded_12 = iteration;
-        let values = (loaded_12 & 1u32)
-            .wrapping_mul(SPREAD_WORKGROUP)
-            .wrapping_add(invocation)
-            .wrapping_sub(lane)
-            .wrapping_mul(3u32);
-        let loaded_13 = end;
-        let j = loaded_13.wrapping_sub(lanes).wrapping_add(lane);
-        if j < count {
+        let _block = machine.block(line!(), 20);
+        let loaded_4 = iteration;
+        let values = (loaded_4 & 1u32)
+            .wrapping_mul(0x180u32)
+            .wrapping_add(run_values);
+        let loaded_5 = first_j;
+        let j = loaded_5.wrapping_add(sample_lane);
+        if j < lane_count {
             let _block = machine.block(line!(), 13);
             rotation = <[M::F; 4]>::default();
-            let loaded_14 = item.count;
-            let loaded_15 = item.key;
-            if (loaded_14 < NEEDS_CARE) & ((j != 0u32) | (loaded_15 == NO_KEY)) {
-                let _block = machine.block(line!(), 3);
-                let loaded_16 = item;
-                let result_3 = evaluate_near_arc_segment(machine, loaded_16, segment, constant, j);
+            let loaded_6 = item.count;
+            let loaded_7 = item.key;
+            if (loaded_6 < NEEDS_CARE) & ((j != 0u32) | (loaded_7 == NO_KEY)) {
+                let _block = machine.block(line!(), 6);
+                let loaded_8 = item;
+                let loaded_9 = item.first;
+                let result_3 = evaluate_near_arc_segment(
+                    machine,
+                    loaded_8,
+                    segment,
+                    constant,
+                    loaded_9.wrapping_add(j as i32),
+                );
                 rotation = result_3;
             } else {
                 let _block = machine.block(line!(), 3);
-                let loaded_17 = item;
-                let result_4 = sample_of_arc_segment(machine, loaded_17, segment, j, group[2]);
+                let loaded_10 = item;
+                let result_4 = sample_of_arc_segment(machine, loaded_10, segment, j, repetition);
                 rotation = result_4;
             }
-            let loaded_18 = rotation;
-            let result_5 = parts_1(machine, loaded_18);
-            all = result_5;
+            let loaded_11 = rotation;
+            let result_5 = parts_1(machine, loaded_11);
+            all_parts = result_5;
             part = 0u32;
             loop {
                 let _block = machine.block(line!(), 13);
-                let loaded_19 = part;
-                if !(loaded_19 < 3u32) {
+                let loaded_12 = part;
+                if !(loaded_12 < 3u32) {
                     break;
                 }
-                let loaded_20 = part;
-                let loaded_21 = part;
-                let loaded_22 = all[loaded_21 as usize];
+                let loaded_13 = part;
+                let loaded_14 = part;
+                let loaded_15 = all_parts[loaded_14 as usize];
                 machine.store::<M::F>(
                     Global::Tile,
                     values
                         .wrapping_add(lane.wrapping_mul(3u32))
-                        .wrapping_add(loaded_20) as usize,
-                    loaded_22,
+                        .wrapping_add(loaded_13) as usize,
+                    loaded_15,
                 );
-                let loaded_23 = part;
-                part = loaded_23.wrapping_add(1u32);
+                let loaded_16 = part;
+                part = loaded_16.wrapping_add(1u32);
             }
         }
         barrier().await;
-        let loaded_24 = end;
-        let loaded_25 = begin;
-        let loaded_26 = end;
-        if (loaded_24.wrapping_sub(loaded_25) == line_lanes) & (loaded_26 <= count) {
-            let _block = machine.block(line!(), 6);
+        let loaded_17 = first_j;
+        if loaded_17 < filling {
+            let _block = machine.block(line!(), 5);
             let found = values.wrapping_add(lane_part);
-            let loaded_27 = begin;
-            let stored = first
-                .wrapping_add(loaded_27)
-                .wrapping_mul(3u32)
-                .wrapping_add(lane_part);
+            let loaded_18 = first_j;
+            let stored = first_part.wrapping_add(loaded_18.wrapping_mul(stride));
             part_2 = 0u32;
             loop {
                 let _block = machine.block(line!(), 14);
-                let loaded_28 = part_2;
-                if !(loaded_28 < 3u32) {
+                let loaded_19 = part_2;
+                if !(loaded_19 < 3u32) {
                     break;
                 }
-                let loaded_29 = part_2;
-                let loaded_30 = part_2;
-                let loaded_31 = machine.load::<M::F>(
+                let loaded_20 = part_2;
+                let loaded_21 = part_2;
+                let loaded_22 = machine.load::<M::F>(
                     Global::Tile,
-                    found.wrapping_add(loaded_30.wrapping_mul(LINE)) as usize,
+                    found.wrapping_add(loaded_21.wrapping_mul(LINE)) as usize,
                 );
                 machine.store::<M::F>(
                     Global::Rotations,
-                    stored.wrapping_add(loaded_29.wrapping_mul(LINE)) as usize,
-                    loaded_31,
+                    stored.wrapping_add(loaded_20.wrapping_mul(LINE)) as usize,
+                    loaded_22,
                 );
-                let loaded_32 = part_2;
-                part_2 = loaded_32.wrapping_add(1u32);
+                let loaded_23 = part_2;
+                part_2 = loaded_23.wrapping_add(1u32);
             }
         } else {
-            let _block = machine.block(line!(), 13);
-            let loaded_33 = end;
-            let shift = values.wrapping_add(lanes.wrapping_sub(loaded_33).wrapping_mul(3u32));
-            let loaded_34 = end;
-            let loaded_35 = end;
-            let parts_end = (if count < loaded_35 { count } else { loaded_34 }).wrapping_mul(3u32);
-            let loaded_36 = begin;
-            part_3 = loaded_36.wrapping_mul(3u32).wrapping_add(lane);
+            let _block = machine.block(line!(), 18);
+            let loaded_24 = first_j;
+            let loaded_25 = first_j;
+            let first_lane = if (loaded_25 as i32) < 0i32 {
+                0u32.wrapping_sub(loaded_24)
+            } else {
+                0u32
+            };
+            let loaded_26 = first_j;
+            let last_j = loaded_26.wrapping_add(all.sample_mask);
+            end_lane = used_lanes;
+            if last_j >= count {
+                let _block = machine.block(line!(), 11);
+                let missing = if all.track_mask != 0u32 {
+                    lanes
+                } else {
+                    last_j.wrapping_add(1u32).wrapping_sub(count)
+                };
+                let loaded_27 = end_lane;
+                let loaded_28 = end_lane;
+                let loaded_29 = end_lane;
+                end_lane = loaded_27.wrapping_sub(if missing > loaded_29 {
+                    loaded_28
+                } else {
+                    missing
+                });
+            }
+            let loaded_30 = first_j;
+            let stored_2 = first
+                .wrapping_mul(3u32)
+                .wrapping_add(loaded_30.wrapping_mul(stride));
+            part_3 = first_lane.wrapping_mul(3u32).wrapping_add(lane);
             loop {
-                let _block = machine.block(line!(), 13);
-                let loaded_37 = part_3;
-                if !(loaded_37 < parts_end) {
+                let _block = machine.block(line!(), 14);
+                let loaded_31 = part_3;
+                let loaded_32 = end_lane;
+                if !(loaded_31 < loaded_32.wrapping_mul(3u32)) {
                     break;
                 }
-                let loaded_38 = part_3;
-                let loaded_39 = part_3;
-                let loaded_40 =
-                    machine.load::<M::F>(Global::Tile, shift.wrapping_add(loaded_39) as usize);
+                let loaded_33 = part_3;
+                let loaded_34 = part_3;
+                let loaded_35 =
+                    machine.load::<M::F>(Global::Tile, values.wrapping_add(loaded_34) as usize);
                 machine.store::<M::F>(
                     Global::Rotations,
-                    first.wrapping_mul(3u32).wrapping_add(loaded_38) as usize,
-                    loaded_40,
+                    stored_2.wrapping_add(loaded_33) as usize,
+                    loaded_35,
                 );
-                let loaded_41 = part_3;
-                part_3 = loaded_41.wrapping_add(lanes);
+                let loaded_36 = part_3;
+                part_3 = loaded_36.wrapping_add(lanes);
             }
         }
-        let loaded_42 = end;
-        begin = loaded_42;
-        let loaded_43 = end;
-        end = loaded_43.wrapping_add(lanes);
-        let loaded_44 = iteration;
-        iteration = loaded_44.wrapping_add(1u32);
-        let loaded_45 = iteration;
-        if loaded_45 >= iterations {
+        let loaded_37 = first_j;
+        first_j = loaded_37.wrapping_add(all.step);
+        let loaded_38 = iteration;
+        iteration = loaded_38.wrapping_add(1u32);
+        let loaded_39 = iteration;
+        if loaded_39 >= iterations {
             break;
         }
     }
@@ -3049,181 +3315,207 @@ pub(crate) async fn main_of_together<M: Machine>(machine: &M) {
 
 pub(crate) async fn main_of_together_2<M: Machine>(machine: &M) {
     let group = machine.ids().workgroup_id;
-    let groups = machine.ids().num_workgroups;
     let invocation = machine.ids().local_invocation_index;
     let mut item: SpreadRun<M::F> = Default::default();
-    let mut begin: u32 = 0u32;
-    let mut end: u32 = Default::default();
+    let mut first_j: u32 = Default::default();
     let mut iteration: u32 = 0u32;
     let mut rotation: [M::F; 4] = Default::default();
-    let mut all: [M::F; 9] = Default::default();
+    let mut all_parts: [M::F; 9] = Default::default();
     let mut part: u32 = Default::default();
     let mut part_2: u32 = Default::default();
+    let mut end_lane: u32 = Default::default();
     let mut part_3: u32 = Default::default();
-    let _block = machine.block(line!(), 41);
-    let loaded = machine.load::<u32>(Global::Dispatch, 4);
-    let lanes = 1u32 << loaded;
-    let workgroup = group[1].wrapping_mul(groups[0]).wrapping_add(group[0]);
-    let loaded_2 = machine.load::<u32>(Global::Dispatch, 4);
-    let first_index = workgroup.wrapping_mul(SPREAD_WORKGROUP >> loaded_2);
-    let loaded_3 = machine.load::<u32>(Global::Dispatch, 2);
-    if first_index >= loaded_3 {
+    let _block = machine.block(line!(), 58);
+    let all = machine.load::<Spread>(Global::Dispatch, 0);
+    let lanes = 1u32 << all.lanes_log2;
+    let first_index = group[0].wrapping_mul(SPREAD_WORKGROUP >> all.lanes_log2);
+    if first_index >= all.item_count {
         return;
     }
-    let loaded_4 = machine.load::<u32>(Global::Dispatch, 1);
-    let result = item_at_spread_run(machine, loaded_4.wrapping_add(first_index));
+    let result = item_at_spread_run(machine, all.first_item.wrapping_add(first_index));
     let iterations = result.iterations;
-    let loaded_5 = machine.load::<u32>(Global::Dispatch, 4);
-    let index = first_index.wrapping_add(invocation >> loaded_5);
-    let loaded_6 = machine.load::<u32>(Global::Dispatch, 2);
-    if index < loaded_6 {
-        let _block = machine.block(line!(), 4);
-        let loaded_7 = machine.load::<u32>(Global::Dispatch, 1);
-        let result_2 = item_at_spread_run(machine, loaded_7.wrapping_add(index));
+    let index = first_index.wrapping_add(invocation >> all.lanes_log2);
+    if index < all.item_count {
+        let _block = machine.block(line!(), 3);
+        let result_2 = item_at_spread_run(machine, all.first_item.wrapping_add(index));
         item = result_2;
     }
-    let loaded_8 = item;
-    let location = location_of(machine, loaded_8, group[2]);
-    let loaded_9 = item.count;
-    let segment = segment_at_arc_segment(
-        machine,
-        if loaded_9 & IS_CONSTANT != 0u32 {
-            0u32
-        } else {
-            location[0]
-        },
-    );
+    let first_repetition = group[2].wrapping_mul(all.layer_repetitions);
+    let repetition = first_repetition.wrapping_add(invocation & all.track_mask);
+    let is_there = repetition < all.repetitions;
+    let loaded = item;
+    let location = location_of(machine, loaded, repetition);
+    let loaded_2 = item.count;
+    let has_segment = is_there & (loaded_2 & IS_CONSTANT == 0u32);
+    let segment = segment_at_arc_segment(machine, if has_segment { location[0] } else { 0u32 });
     let constant = constant_of_arc_segment(machine, segment);
-    let loaded_10 = item;
-    let count = sample_count(machine, loaded_10);
-    let first = location[1];
-    let loaded_11 = machine.load::<u32>(Global::Dispatch, 5);
-    let idle = first & loaded_11;
+    let loaded_3 = item;
+    let count = sample_count(machine, loaded_3);
+    let lane_count = if is_there { count } else { 0u32 };
+    let tracks = all.repetitions.wrapping_sub(first_repetition);
+    let used_lanes = if (all.track_mask != 0u32) & (tracks < lanes) {
+        tracks
+    } else {
+        lanes
+    };
     let lane = invocation & lanes.wrapping_sub(1u32);
+    let run_values = invocation.wrapping_sub(lane).wrapping_mul(9u32);
     let lane_part = (lane & 0xfffffff8u32)
         .wrapping_mul(9u32)
         .wrapping_add(lane & 7u32);
-    let line_lanes = if lanes >= LINE { lanes } else { 0u32 };
-    end = lanes.wrapping_sub(idle);
+    let first = location[1].wrapping_sub((invocation & all.track_mask).wrapping_mul(all.outputs));
+    let first_part = first.wrapping_mul(9u32).wrapping_add(lane_part);
+    let stride = all.stride.wrapping_mul(9u32);
+    let fills_lines = (lanes >= LINE) & (used_lanes == lanes) & (count > all.sample_mask);
+    let filling = if fills_lines {
+        count.wrapping_sub(all.sample_mask)
+    } else {
+        0u32
+    };
+    let sample_lane = invocation & all.sample_mask;
+    first_j = 0u32.wrapping_sub(first & all.line_mask);
     loop {
-        let _block = machine.block(line!(), 30);
-        let loaded_12 = iteration;
-        let values = (loaded_12 & 1u32)
-            .wrapping_mul(SPREAD_WORKGROUP)
-            .wrapping_add(invocation)
-            .wrapping_sub(lane)
-            .wrapping_mul(9u32);
-        let loaded_13 = end;
-        let j = loaded_13.wrapping_sub(lanes).wrapping_add(lane);
-        if j < count {
+        let _block = machine.block(line!(), 20);
+        let loaded_4 = iteration;
+        let values = (loaded_4 & 1u32)
+            .wrapping_mul(0x480u32)
+            .wrapping_add(run_values);
+        let loaded_5 = first_j;
+        let j = loaded_5.wrapping_add(sample_lane);
+        if j < lane_count {
             let _block = machine.block(line!(), 13);
             rotation = <[M::F; 4]>::default();
-            let loaded_14 = item.count;
-            let loaded_15 = item.key;
-            if (loaded_14 < NEEDS_CARE) & ((j != 0u32) | (loaded_15 == NO_KEY)) {
-                let _block = machine.block(line!(), 3);
-                let loaded_16 = item;
-                let result_3 = evaluate_near_arc_segment(machine, loaded_16, segment, constant, j);
+            let loaded_6 = item.count;
+            let loaded_7 = item.key;
+            if (loaded_6 < NEEDS_CARE) & ((j != 0u32) | (loaded_7 == NO_KEY)) {
+                let _block = machine.block(line!(), 6);
+                let loaded_8 = item;
+                let loaded_9 = item.first;
+                let result_3 = evaluate_near_arc_segment(
+                    machine,
+                    loaded_8,
+                    segment,
+                    constant,
+                    loaded_9.wrapping_add(j as i32),
+                );
                 rotation = result_3;
             } else {
                 let _block = machine.block(line!(), 3);
-                let loaded_17 = item;
-                let result_4 = sample_of_arc_segment(machine, loaded_17, segment, j, group[2]);
+                let loaded_10 = item;
+                let result_4 = sample_of_arc_segment(machine, loaded_10, segment, j, repetition);
                 rotation = result_4;
             }
-            let loaded_18 = rotation;
-            let result_5 = parts_2(machine, loaded_18);
-            all = result_5;
+            let loaded_11 = rotation;
+            let result_5 = parts_2(machine, loaded_11);
+            all_parts = result_5;
             part = 0u32;
             loop {
                 let _block = machine.block(line!(), 13);
-                let loaded_19 = part;
-                if !(loaded_19 < 9u32) {
+                let loaded_12 = part;
+                if !(loaded_12 < 9u32) {
                     break;
                 }
-                let loaded_20 = part;
-                let loaded_21 = part;
-                let loaded_22 = all[loaded_21 as usize];
+                let loaded_13 = part;
+                let loaded_14 = part;
+                let loaded_15 = all_parts[loaded_14 as usize];
                 machine.store::<M::F>(
                     Global::Tile,
                     values
                         .wrapping_add(lane.wrapping_mul(9u32))
-                        .wrapping_add(loaded_20) as usize,
-                    loaded_22,
+                        .wrapping_add(loaded_13) as usize,
+                    loaded_15,
                 );
-                let loaded_23 = part;
-                part = loaded_23.wrapping_add(1u32);
+                let loaded_16 = part;
+                part = loaded_16.wrapping_add(1u32);
             }
         }
         barrier().await;
-        let loaded_24 = end;
-        let loaded_25 = begin;
-        let loaded_26 = end;
-        if (loaded_24.wrapping_sub(loaded_25) == line_lanes) & (loaded_26 <= count) {
-            let _block = machine.block(line!(), 6);
+        let loaded_17 = first_j;
+        if loaded_17 < filling {
+            let _block = machine.block(line!(), 5);
             let found = values.wrapping_add(lane_part);
-            let loaded_27 = begin;
-            let stored = first
-                .wrapping_add(loaded_27)
-                .wrapping_mul(9u32)
-                .wrapping_add(lane_part);
+            let loaded_18 = first_j;
+            let stored = first_part.wrapping_add(loaded_18.wrapping_mul(stride));
             part_2 = 0u32;
             loop {
                 let _block = machine.block(line!(), 14);
-                let loaded_28 = part_2;
-                if !(loaded_28 < 9u32) {
+                let loaded_19 = part_2;
+                if !(loaded_19 < 9u32) {
                     break;
                 }
-                let loaded_29 = part_2;
-                let loaded_30 = part_2;
-                let loaded_31 = machine.load::<M::F>(
+                let loaded_20 = part_2;
+                let loaded_21 = part_2;
+                let loaded_22 = machine.load::<M::F>(
                     Global::Tile,
-                    found.wrapping_add(loaded_30.wrapping_mul(LINE)) as usize,
+                    found.wrapping_add(loaded_21.wrapping_mul(LINE)) as usize,
                 );
                 machine.store::<M::F>(
                     Global::Rotations,
-                    stored.wrapping_add(loaded_29.wrapping_mul(LINE)) as usize,
-                    loaded_31,
+                    stored.wrapping_add(loaded_20.wrapping_mul(LINE)) as usize,
+                    loaded_22,
                 );
-                let loaded_32 = part_2;
-                part_2 = loaded_32.wrapping_add(1u32);
+                let loaded_23 = part_2;
+                part_2 = loaded_23.wrapping_add(1u32);
             }
         } else {
-            let _block = machine.block(line!(), 13);
-            let loaded_33 = end;
-            let shift = values.wrapping_add(lanes.wrapping_sub(loaded_33).wrapping_mul(9u32));
-            let loaded_34 = end;
-            let loaded_35 = end;
-            let parts_end = (if count < loaded_35 { count } else { loaded_34 }).wrapping_mul(9u32);
-            let loaded_36 = begin;
-            part_3 = loaded_36.wrapping_mul(9u32).wrapping_add(lane);
+            let _block = machine.block(line!(), 18);
+            let loaded_24 = first_j;
+            let loaded_25 = first_j;
+            let first_lane = if (loaded_25 as i32) < 0i32 {
+                0u32.wrapping_sub(loaded_24)
+            } else {
+                0u32
+            };
+            let loaded_26 = first_j;
+            let last_j = loaded_26.wrapping_add(all.sample_mask);
+            end_lane = used_lanes;
+            if last_j >= count {
+                let _block = machine.block(line!(), 11);
+                let missing = if all.track_mask != 0u32 {
+                    lanes
+                } else {
+                    last_j.wrapping_add(1u32).wrapping_sub(count)
+                };
+                let loaded_27 = end_lane;
+                let loaded_28 = end_lane;
+                let loaded_29 = end_lane;
+                end_lane = loaded_27.wrapping_sub(if missing > loaded_29 {
+                    loaded_28
+                } else {
+                    missing
+                });
+            }
+            let loaded_30 = first_j;
+            let stored_2 = first
+                .wrapping_mul(9u32)
+                .wrapping_add(loaded_30.wrapping_mul(stride));
+            part_3 = first_lane.wrapping_mul(9u32).wrapping_add(lane);
             loop {
-                let _block = machine.block(line!(), 13);
-                let loaded_37 = part_3;
-                if !(loaded_37 < parts_end) {
+                let _block = machine.block(line!(), 14);
+                let loaded_31 = part_3;
+                let loaded_32 = end_lane;
+                if !(loaded_31 < loaded_32.wrapping_mul(9u32)) {
                     break;
                 }
-                let loaded_38 = part_3;
-                let loaded_39 = part_3;
-                let loaded_40 =
-                    machine.load::<M::F>(Global::Tile, shift.wrapping_add(loaded_39) as usize);
+                let loaded_33 = part_3;
+                let loaded_34 = part_3;
+                let loaded_35 =
+                    machine.load::<M::F>(Global::Tile, values.wrapping_add(loaded_34) as usize);
                 machine.store::<M::F>(
                     Global::Rotations,
-                    first.wrapping_mul(9u32).wrapping_add(loaded_38) as usize,
-                    loaded_40,
+                    stored_2.wrapping_add(loaded_33) as usize,
+                    loaded_35,
                 );
-                let loaded_41 = part_3;
-                part_3 = loaded_41.wrapping_add(lanes);
+                let loaded_36 = part_3;
+                part_3 = loaded_36.wrapping_add(lanes);
             }
         }
-        let loaded_42 = end;
-        begin = loaded_42;
-        let loaded_43 = end;
-        end = loaded_43.wrapping_add(lanes);
-        let loaded_44 = iteration;
-        iteration = loaded_44.wrapping_add(1u32);
-        let loaded_45 = iteration;
-        if loaded_45 >= iterations {
+        let loaded_37 = first_j;
+        first_j = loaded_37.wrapping_add(all.step);
+        let loaded_38 = iteration;
+        iteration = loaded_38.wrapping_add(1u32);
+        let loaded_39 = iteration;
+        if loaded_39 >= iterations {
             break;
         }
     }
@@ -3231,181 +3523,207 @@ pub(crate) async fn main_of_together_2<M: Machine>(machine: &M) {
 
 pub(crate) async fn main_of_together_3<M: Machine>(machine: &M) {
     let group = machine.ids().workgroup_id;
-    let groups = machine.ids().num_workgroups;
     let invocation = machine.ids().local_invocation_index;
     let mut item: SpreadRun<M::F> = Default::default();
-    let mut begin: u32 = 0u32;
-    let mut end: u32 = Default::default();
+    let mut first_j: u32 = Default::default();
     let mut iteration: u32 = 0u32;
     let mut rotation: [M::F; 4] = Default::default();
-    let mut all: [[M::F; 4]; 3] = Default::default();
+    let mut all_parts: [[M::F; 4]; 3] = Default::default();
     let mut part: u32 = Default::default();
     let mut part_2: u32 = Default::default();
+    let mut end_lane: u32 = Default::default();
     let mut part_3: u32 = Default::default();
-    let _block = machine.block(line!(), 41);
-    let loaded = machine.load::<u32>(Global::Dispatch, 4);
-    let lanes = 1u32 << loaded;
-    let workgroup = group[1].wrapping_mul(groups[0]).wrapping_add(group[0]);
-    let loaded_2 = machine.load::<u32>(Global::Dispatch, 4);
-    let first_index = workgroup.wrapping_mul(SPREAD_WORKGROUP >> loaded_2);
-    let loaded_3 = machine.load::<u32>(Global::Dispatch, 2);
-    if first_index >= loaded_3 {
+    let _block = machine.block(line!(), 58);
+    let all = machine.load::<Spread>(Global::Dispatch, 0);
+    let lanes = 1u32 << all.lanes_log2;
+    let first_index = group[0].wrapping_mul(SPREAD_WORKGROUP >> all.lanes_log2);
+    if first_index >= all.item_count {
         return;
     }
-    let loaded_4 = machine.load::<u32>(Global::Dispatch, 1);
-    let result = item_at_spread_run(machine, loaded_4.wrapping_add(first_index));
+    let result = item_at_spread_run(machine, all.first_item.wrapping_add(first_index));
     let iterations = result.iterations;
-    let loaded_5 = machine.load::<u32>(Global::Dispatch, 4);
-    let index = first_index.wrapping_add(invocation >> loaded_5);
-    let loaded_6 = machine.load::<u32>(Global::Dispatch, 2);
-    if index < loaded_6 {
-        let _block = machine.block(line!(), 4);
-        let loaded_7 = machine.load::<u32>(Global::Dispatch, 1);
-        let result_2 = item_at_spread_run(machine, loaded_7.wrapping_add(index));
+    let index = first_index.wrapping_add(invocation >> all.lanes_log2);
+    if index < all.item_count {
+        let _block = machine.block(line!(), 3);
+        let result_2 = item_at_spread_run(machine, all.first_item.wrapping_add(index));
         item = result_2;
     }
-    let loaded_8 = item;
-    let location = location_of(machine, loaded_8, group[2]);
-    let loaded_9 = item.count;
-    let segment = segment_at_arc_segment(
-        machine,
-        if loaded_9 & IS_CONSTANT != 0u32 {
-            0u32
-        } else {
-            location[0]
-        },
-    );
+    let first_repetition = group[2].wrapping_mul(all.layer_repetitions);
+    let repetition = first_repetition.wrapping_add(invocation & all.track_mask);
+    let is_there = repetition < all.repetitions;
+    let loaded = item;
+    let location = location_of(machine, loaded, repetition);
+    let loaded_2 = item.count;
+    let has_segment = is_there & (loaded_2 & IS_CONSTANT == 0u32);
+    let segment = segment_at_arc_segment(machine, if has_segment { location[0] } else { 0u32 });
     let constant = constant_of_arc_segment(machine, segment);
-    let loaded_10 = item;
-    let count = sample_count(machine, loaded_10);
-    let first = location[1];
-    let loaded_11 = machine.load::<u32>(Global::Dispatch, 5);
-    let idle = first & loaded_11;
+    let loaded_3 = item;
+    let count = sample_count(machine, loaded_3);
+    let lane_count = if is_there { count } else { 0u32 };
+    let tracks = all.repetitions.wrapping_sub(first_repetition);
+    let used_lanes = if (all.track_mask != 0u32) & (tracks < lanes) {
+        tracks
+    } else {
+        lanes
+    };
     let lane = invocation & lanes.wrapping_sub(1u32);
+    let run_values = invocation.wrapping_sub(lane).wrapping_mul(3u32);
     let lane_part = (lane & 0xfffffff8u32)
         .wrapping_mul(3u32)
         .wrapping_add(lane & 7u32);
-    let line_lanes = if lanes >= LINE { lanes } else { 0u32 };
-    end = lanes.wrapping_sub(idle);
+    let first = location[1].wrapping_sub((invocation & all.track_mask).wrapping_mul(all.outputs));
+    let first_part = first.wrapping_mul(3u32).wrapping_add(lane_part);
+    let stride = all.stride.wrapping_mul(3u32);
+    let fills_lines = (lanes >= LINE) & (used_lanes == lanes) & (count > all.sample_mask);
+    let filling = if fills_lines {
+        count.wrapping_sub(all.sample_mask)
+    } else {
+        0u32
+    };
+    let sample_lane = invocation & all.sample_mask;
+    first_j = 0u32.wrapping_sub(first & all.line_mask);
     loop {
-        let _block = machine.block(line!(), 30);
-        let loaded_12 = iteration;
-        let values = (loaded_12 & 1u32)
-            .wrapping_mul(SPREAD_WORKGROUP)
-            .wrapping_add(invocation)
-            .wrapping_sub(lane)
-            .wrapping_mul(3u32);
-        let loaded_13 = end;
-        let j = loaded_13.wrapping_sub(lanes).wrapping_add(lane);
-        if j < count {
+        let _block = machine.block(line!(), 20);
+        let loaded_4 = iteration;
+        let values = (loaded_4 & 1u32)
+            .wrapping_mul(0x180u32)
+            .wrapping_add(run_values);
+        let loaded_5 = first_j;
+        let j = loaded_5.wrapping_add(sample_lane);
+        if j < lane_count {
             let _block = machine.block(line!(), 13);
             rotation = <[M::F; 4]>::default();
-            let loaded_14 = item.count;
-            let loaded_15 = item.key;
-            if (loaded_14 < NEEDS_CARE) & ((j != 0u32) | (loaded_15 == NO_KEY)) {
-                let _block = machine.block(line!(), 3);
-                let loaded_16 = item;
-                let result_3 = evaluate_near_arc_segment(machine, loaded_16, segment, constant, j);
+            let loaded_6 = item.count;
+            let loaded_7 = item.key;
+            if (loaded_6 < NEEDS_CARE) & ((j != 0u32) | (loaded_7 == NO_KEY)) {
+                let _block = machine.block(line!(), 6);
+                let loaded_8 = item;
+                let loaded_9 = item.first;
+                let result_3 = evaluate_near_arc_segment(
+                    machine,
+                    loaded_8,
+                    segment,
+                    constant,
+                    loaded_9.wrapping_add(j as i32),
+                );
                 rotation = result_3;
             } else {
                 let _block = machine.block(line!(), 3);
-                let loaded_17 = item;
-                let result_4 = sample_of_arc_segment(machine, loaded_17, segment, j, group[2]);
+                let loaded_10 = item;
+                let result_4 = sample_of_arc_segment(machine, loaded_10, segment, j, repetition);
                 rotation = result_4;
             }
-            let loaded_18 = rotation;
-            let result_5 = parts_3(machine, loaded_18);
-            all = result_5;
+            let loaded_11 = rotation;
+            let result_5 = parts_3(machine, loaded_11);
+            all_parts = result_5;
             part = 0u32;
             loop {
                 let _block = machine.block(line!(), 13);
-                let loaded_19 = part;
-                if !(loaded_19 < 3u32) {
+                let loaded_12 = part;
+                if !(loaded_12 < 3u32) {
                     break;
                 }
-                let loaded_20 = part;
-                let loaded_21 = part;
-                let loaded_22 = all[loaded_21 as usize];
+                let loaded_13 = part;
+                let loaded_14 = part;
+                let loaded_15 = all_parts[loaded_14 as usize];
                 machine.store::<[M::F; 4]>(
                     Global::Tile,
                     4 * (values
                         .wrapping_add(lane.wrapping_mul(3u32))
-                        .wrapping_add(loaded_20) as usize),
-                    loaded_22,
+                        .wrapping_add(loaded_13) as usize),
+                    loaded_15,
                 );
-                let loaded_23 = part;
-                part = loaded_23.wrapping_add(1u32);
+                let loaded_16 = part;
+                part = loaded_16.wrapping_add(1u32);
             }
         }
         barrier().await;
-        let loaded_24 = end;
-        let loaded_25 = begin;
-        let loaded_26 = end;
-        if (loaded_24.wrapping_sub(loaded_25) == line_lanes) & (loaded_26 <= count) {
-            let _block = machine.block(line!(), 6);
+        let loaded_17 = first_j;
+        if loaded_17 < filling {
+            let _block = machine.block(line!(), 5);
             let found = values.wrapping_add(lane_part);
-            let loaded_27 = begin;
-            let stored = first
-                .wrapping_add(loaded_27)
-                .wrapping_mul(3u32)
-                .wrapping_add(lane_part);
+            let loaded_18 = first_j;
+            let stored = first_part.wrapping_add(loaded_18.wrapping_mul(stride));
             part_2 = 0u32;
             loop {
                 let _block = machine.block(line!(), 14);
-                let loaded_28 = part_2;
-                if !(loaded_28 < 3u32) {
+                let loaded_19 = part_2;
+                if !(loaded_19 < 3u32) {
                     break;
                 }
-                let loaded_29 = part_2;
-                let loaded_30 = part_2;
-                let loaded_31 = machine.load::<[M::F; 4]>(
+                let loaded_20 = part_2;
+                let loaded_21 = part_2;
+                let loaded_22 = machine.load::<[M::F; 4]>(
                     Global::Tile,
-                    4 * (found.wrapping_add(loaded_30.wrapping_mul(LINE)) as usize),
+                    4 * (found.wrapping_add(loaded_21.wrapping_mul(LINE)) as usize),
                 );
                 machine.store::<[M::F; 4]>(
                     Global::Rotations,
-                    4 * (stored.wrapping_add(loaded_29.wrapping_mul(LINE)) as usize),
-                    loaded_31,
+                    4 * (stored.wrapping_add(loaded_20.wrapping_mul(LINE)) as usize),
+                    loaded_22,
                 );
-                let loaded_32 = part_2;
-                part_2 = loaded_32.wrapping_add(1u32);
+                let loaded_23 = part_2;
+                part_2 = loaded_23.wrapping_add(1u32);
             }
         } else {
-            let _block = machine.block(line!(), 13);
-            let loaded_33 = end;
-            let shift = values.wrapping_add(lanes.wrapping_sub(loaded_33).wrapping_mul(3u32));
-            let loaded_34 = end;
-            let loaded_35 = end;
-            let parts_end = (if count < loaded_35 { count } else { loaded_34 }).wrapping_mul(3u32);
-            let loaded_36 = begin;
-            part_3 = loaded_36.wrapping_mul(3u32).wrapping_add(lane);
+            let _block = machine.block(line!(), 18);
+            let loaded_24 = first_j;
+            let loaded_25 = first_j;
+            let first_lane = if (loaded_25 as i32) < 0i32 {
+                0u32.wrapping_sub(loaded_24)
+            } else {
+                0u32
+            };
+            let loaded_26 = first_j;
+            let last_j = loaded_26.wrapping_add(all.sample_mask);
+            end_lane = used_lanes;
+            if last_j >= count {
+                let _block = machine.block(line!(), 11);
+                let missing = if all.track_mask != 0u32 {
+                    lanes
+                } else {
+                    last_j.wrapping_add(1u32).wrapping_sub(count)
+                };
+                let loaded_27 = end_lane;
+                let loaded_28 = end_lane;
+                let loaded_29 = end_lane;
+                end_lane = loaded_27.wrapping_sub(if missing > loaded_29 {
+                    loaded_28
+                } else {
+                    missing
+                });
+            }
+            let loaded_30 = first_j;
+            let stored_2 = first
+                .wrapping_mul(3u32)
+                .wrapping_add(loaded_30.wrapping_mul(stride));
+            part_3 = first_lane.wrapping_mul(3u32).wrapping_add(lane);
             loop {
-                let _block = machine.block(line!(), 13);
-                let loaded_37 = part_3;
-                if !(loaded_37 < parts_end) {
+                let _block = machine.block(line!(), 14);
+                let loaded_31 = part_3;
+                let loaded_32 = end_lane;
+                if !(loaded_31 < loaded_32.wrapping_mul(3u32)) {
                     break;
                 }
-                let loaded_38 = part_3;
-                let loaded_39 = part_3;
-                let loaded_40 = machine
-                    .load::<[M::F; 4]>(Global::Tile, 4 * (shift.wrapping_add(loaded_39) as usize));
+                let loaded_33 = part_3;
+                let loaded_34 = part_3;
+                let loaded_35 = machine
+                    .load::<[M::F; 4]>(Global::Tile, 4 * (values.wrapping_add(loaded_34) as usize));
                 machine.store::<[M::F; 4]>(
                     Global::Rotations,
-                    4 * (first.wrapping_mul(3u32).wrapping_add(loaded_38) as usize),
-                    loaded_40,
+                    4 * (stored_2.wrapping_add(loaded_33) as usize),
+                    loaded_35,
                 );
-                let loaded_41 = part_3;
-                part_3 = loaded_41.wrapping_add(lanes);
+                let loaded_36 = part_3;
+                part_3 = loaded_36.wrapping_add(lanes);
             }
         }
-        let loaded_42 = end;
-        begin = loaded_42;
-        let loaded_43 = end;
-        end = loaded_43.wrapping_add(lanes);
-        let loaded_44 = iteration;
-        iteration = loaded_44.wrapping_add(1u32);
-        let loaded_45 = iteration;
-        if loaded_45 >= iterations {
+        let loaded_37 = first_j;
+        first_j = loaded_37.wrapping_add(all.step);
+        let loaded_38 = iteration;
+        iteration = loaded_38.wrapping_add(1u32);
+        let loaded_39 = iteration;
+        if loaded_39 >= iterations {
             break;
         }
     }
@@ -3571,91 +3889,106 @@ pub(crate) async fn main_of_coalesced_2<M: Machine>(machine: &M) {
 
 pub(crate) async fn main_of_alone_2<M: Machine>(machine: &M) {
     let group = machine.ids().workgroup_id;
-    let groups = machine.ids().num_workgroups;
     let invocation = machine.ids().local_invocation_index;
-    let mut rotation: [M::F; 4] = Default::default();
-    let mut j: u32 = Default::default();
-    let mut pairs: u32 = Default::default();
-    let _block = machine.block(line!(), 38);
-    let lanes_log2 = machine.load::<u32>(Global::Dispatch, 4);
-    let lanes = 1u32 << lanes_log2;
-    let workgroup = group[1].wrapping_mul(groups[0]).wrapping_add(group[0]);
-    let index = workgroup
+    let mut at: i32 = Default::default();
+    let _block = machine.block(line!(), 47);
+    let all = machine.load::<Spread>(Global::Dispatch, 0);
+    let index = group[0]
         .wrapping_mul(SPREAD_WORKGROUP)
         .wrapping_add(invocation)
-        >> lanes_log2;
-    let loaded = machine.load::<u32>(Global::Dispatch, 2);
-    if index >= loaded {
+        >> all.lanes_log2;
+    let repetition = group[2]
+        .wrapping_mul(all.layer_repetitions)
+        .wrapping_add(invocation & all.track_mask);
+    if (index >= all.item_count) | (repetition >= all.repetitions) {
         return;
     }
-    let loaded_2 = machine.load::<u32>(Global::Dispatch, 1);
-    let item = item_at_spread_run(machine, loaded_2.wrapping_add(index));
-    let location = location_of(machine, item, group[2]);
+    let item = item_at_spread_run(machine, all.first_item.wrapping_add(index));
+    let location = location_of(machine, item, repetition);
     let first = location[1];
-    let loaded_3 = machine.load::<u32>(Global::Dispatch, 5);
-    let idle = first & loaded_3;
-    let first_j = (invocation & lanes.wrapping_sub(1u32)).wrapping_sub(idle);
+    let idle = first & all.line_mask;
+    let first_j = (invocation & all.sample_mask).wrapping_sub(idle);
     if item.count >= NEEDS_CARE {
         let _block = machine.block(line!(), 1);
-        store_with_care(machine, item, location, first_j, lanes, group[2]);
+        store_with_care(machine, item, location, first_j, repetition);
         return;
     }
     let count = item.count;
     let segment = segment_at_polynomial_segment(machine, location[0]);
     let constant = constant_of_polynomial_segment(machine, segment);
+    let first_at = item.first.wrapping_add(first_j as i32);
     if first_j < count {
-        let _block = machine.block(line!(), 9);
-        let result = evaluate_near_polynomial_segment(machine, item, segment, constant, first_j);
-        rotation = result;
+        let _block = machine.block(line!(), 4);
         if (first_j == 0u32) & (item.key != NO_KEY) {
             let _block = machine.block(line!(), 2);
-            let result_2 = constant_at(machine, location[2]);
-            rotation = result_2;
+            let result = constant_at(machine, location[2]);
+            store(machine, first, result);
+        } else {
+            let _block = machine.block(line!(), 3);
+            let result_2 =
+                evaluate_near_polynomial_segment(machine, item, segment, constant, first_at);
+            store(machine, first.wrapping_add(first_j), result_2);
         }
-        let loaded_4 = rotation;
-        store(machine, first.wrapping_add(first_j), loaded_4);
     }
-    j = first_j.wrapping_add(lanes);
-    pairs = (count.wrapping_add(idle) >> lanes_log2).wrapping_add(1u32) >> 1u32;
-    let loaded_5 = pairs;
-    if loaded_5 > 1u32 {
+    let base = first.wrapping_sub((item.first as u32).wrapping_mul(all.stride));
+    let step = all.step as i32;
+    let end = item.first.wrapping_add(count as i32);
+    at = first_at.wrapping_add(step);
+    let full = count.wrapping_add(idle) >> all.step_log2;
+    let loaded = at;
+    let pairs_end =
+        loaded.wrapping_add(((full.wrapping_sub(1u32) & 0xfffffffeu32) << all.step_log2) as i32);
+    let loaded_2 = at;
+    if loaded_2 < pairs_end {
+        let _block = machine.block(line!(), 1);
         loop {
-            let _block = machine.block(line!(), 22);
-            let loaded_6 = j;
-            let loaded_7 = j;
+            let _block = machine.block(line!(), 23);
+            let loaded_3 = at;
+            let loaded_4 = at;
             let result_3 =
-                evaluate_near_polynomial_segment(machine, item, segment, constant, loaded_7);
-            store(machine, first.wrapping_add(loaded_6), result_3);
-            let loaded_8 = j;
-            j = loaded_8.wrapping_add(lanes);
-            let loaded_9 = j;
-            let loaded_10 = j;
+                evaluate_near_polynomial_segment(machine, item, segment, constant, loaded_4);
+            store(
+                machine,
+                base.wrapping_add((loaded_3 as u32).wrapping_mul(all.stride)),
+                result_3,
+            );
+            let loaded_5 = at;
+            at = loaded_5.wrapping_add(step);
+            let loaded_6 = at;
+            let loaded_7 = at;
             let result_4 =
-                evaluate_near_polynomial_segment(machine, item, segment, constant, loaded_10);
-            store(machine, first.wrapping_add(loaded_9), result_4);
-            let loaded_11 = j;
-            j = loaded_11.wrapping_add(lanes);
-            let loaded_12 = pairs;
-            pairs = loaded_12.wrapping_sub(1u32);
-            let loaded_13 = pairs;
-            if loaded_13 <= 1u32 {
+                evaluate_near_polynomial_segment(machine, item, segment, constant, loaded_7);
+            store(
+                machine,
+                base.wrapping_add((loaded_6 as u32).wrapping_mul(all.stride)),
+                result_4,
+            );
+            let loaded_8 = at;
+            at = loaded_8.wrapping_add(step);
+            let loaded_9 = at;
+            if loaded_9 >= pairs_end {
                 break;
             }
         }
+        at = pairs_end;
     }
-    let loaded_14 = j;
-    if loaded_14 < count {
+    let loaded_10 = at;
+    if loaded_10 < end {
         loop {
-            let _block = machine.block(line!(), 11);
-            let loaded_15 = j;
-            let loaded_16 = j;
+            let _block = machine.block(line!(), 13);
+            let loaded_11 = at;
+            let loaded_12 = at;
             let result_5 =
-                evaluate_near_polynomial_segment(machine, item, segment, constant, loaded_16);
-            store(machine, first.wrapping_add(loaded_15), result_5);
-            let loaded_17 = j;
-            j = loaded_17.wrapping_add(lanes);
-            let loaded_18 = j;
-            if loaded_18 >= count {
+                evaluate_near_polynomial_segment(machine, item, segment, constant, loaded_12);
+            store(
+                machine,
+                base.wrapping_add((loaded_11 as u32).wrapping_mul(all.stride)),
+                result_5,
+            );
+            let loaded_13 = at;
+            at = loaded_13.wrapping_add(step);
+            let loaded_14 = at;
+            if loaded_14 >= end {
                 break;
             }
         }
@@ -3667,183 +4000,209 @@ pub(crate) async fn main_of_alone_2<M: Machine>(machine: &M) {
 
 pub(crate) async fn main_of_together_4<M: Machine>(machine: &M) {
     let group = machine.ids().workgroup_id;
-    let groups = machine.ids().num_workgroups;
     let invocation = machine.ids().local_invocation_index;
     let mut item: SpreadRun<M::F> = Default::default();
-    let mut begin: u32 = 0u32;
-    let mut end: u32 = Default::default();
+    let mut first_j: u32 = Default::default();
     let mut iteration: u32 = 0u32;
     let mut rotation: [M::F; 4] = Default::default();
-    let mut all: [M::F; 3] = Default::default();
+    let mut all_parts: [M::F; 3] = Default::default();
     let mut part: u32 = Default::default();
     let mut part_2: u32 = Default::default();
+    let mut end_lane: u32 = Default::default();
     let mut part_3: u32 = Default::default();
-    let _block = machine.block(line!(), 41);
-    let loaded = machine.load::<u32>(Global::Dispatch, 4);
-    let lanes = 1u32 << loaded;
-    let workgroup = group[1].wrapping_mul(groups[0]).wrapping_add(group[0]);
-    let loaded_2 = machine.load::<u32>(Global::Dispatch, 4);
-    let first_index = workgroup.wrapping_mul(SPREAD_WORKGROUP >> loaded_2);
-    let loaded_3 = machine.load::<u32>(Global::Dispatch, 2);
-    if first_index >= loaded_3 {
+    let _block = machine.block(line!(), 58);
+    let all = machine.load::<Spread>(Global::Dispatch, 0);
+    let lanes = 1u32 << all.lanes_log2;
+    let first_index = group[0].wrapping_mul(SPREAD_WORKGROUP >> all.lanes_log2);
+    if first_index >= all.item_count {
         return;
     }
-    let loaded_4 = machine.load::<u32>(Global::Dispatch, 1);
-    let result = item_at_spread_run(machine, loaded_4.wrapping_add(first_index));
+    let result = item_at_spread_run(machine, all.first_item.wrapping_add(first_index));
     let iterations = result.iterations;
-    let loaded_5 = machine.load::<u32>(Global::Dispatch, 4);
-    let index = first_index.wrapping_add(invocation >> loaded_5);
-    let loaded_6 = machine.load::<u32>(Global::Dispatch, 2);
-    if index < loaded_6 {
-        let _block = machine.block(line!(), 4);
-        let loaded_7 = machine.load::<u32>(Global::Dispatch, 1);
-        let result_2 = item_at_spread_run(machine, loaded_7.wrapping_add(index));
+    let index = first_index.wrapping_add(invocation >> all.lanes_log2);
+    if index < all.item_count {
+        let _block = machine.block(line!(), 3);
+        let result_2 = item_at_spread_run(machine, all.first_item.wrapping_add(index));
         item = result_2;
     }
-    let loaded_8 = item;
-    let location = location_of(machine, loaded_8, group[2]);
-    let loaded_9 = item.count;
-    let segment = segment_at_polynomial_segment(
-        machine,
-        if loaded_9 & IS_CONSTANT != 0u32 {
-            0u32
-        } else {
-            location[0]
-        },
-    );
+    let first_repetition = group[2].wrapping_mul(all.layer_repetitions);
+    let repetition = first_repetition.wrapping_add(invocation & all.track_mask);
+    let is_there = repetition < all.repetitions;
+    let loaded = item;
+    let location = location_of(machine, loaded, repetition);
+    let loaded_2 = item.count;
+    let has_segment = is_there & (loaded_2 & IS_CONSTANT == 0u32);
+    let segment =
+        segment_at_polynomial_segment(machine, if has_segment { location[0] } else { 0u32 });
     let constant = constant_of_polynomial_segment(machine, segment);
-    let loaded_10 = item;
-    let count = sample_count(machine, loaded_10);
-    let first = location[1];
-    let loaded_11 = machine.load::<u32>(Global::Dispatch, 5);
-    let idle = first & loaded_11;
+    let loaded_3 = item;
+    let count = sample_count(machine, loaded_3);
+    let lane_count = if is_there { count } else { 0u32 };
+    let tracks = all.repetitions.wrapping_sub(first_repetition);
+    let used_lanes = if (all.track_mask != 0u32) & (tracks < lanes) {
+        tracks
+    } else {
+        lanes
+    };
     let lane = invocation & lanes.wrapping_sub(1u32);
+    let run_values = invocation.wrapping_sub(lane).wrapping_mul(3u32);
     let lane_part = (lane & 0xfffffff8u32)
         .wrapping_mul(3u32)
         .wrapping_add(lane & 7u32);
-    let line_lanes = if lanes >= LINE { lanes } else { 0u32 };
-    end = lanes.wrapping_sub(idle);
+    let first = location[1].wrapping_sub((invocation & all.track_mask).wrapping_mul(all.outputs));
+    let first_part = first.wrapping_mul(3u32).wrapping_add(lane_part);
+    let stride = all.stride.wrapping_mul(3u32);
+    let fills_lines = (lanes >= LINE) & (used_lanes == lanes) & (count > all.sample_mask);
+    let filling = if fills_lines {
+        count.wrapping_sub(all.sample_mask)
+    } else {
+        0u32
+    };
+    let sample_lane = invocation & all.sample_mask;
+    first_j = 0u32.wrapping_sub(first & all.line_mask);
     loop {
-        let _block = machine.block(line!(), 30);
-        let loaded_12 = iteration;
-        let values = (loaded_12 & 1u32)
-            .wrapping_mul(SPREAD_WORKGROUP)
-            .wrapping_add(invocation)
-            .wrapping_sub(lane)
-            .wrapping_mul(3u32);
-        let loaded_13 = end;
-        let j = loaded_13.wrapping_sub(lanes).wrapping_add(lane);
-        if j < count {
+        let _block = machine.block(line!(), 20);
+        let loaded_4 = iteration;
+        let values = (loaded_4 & 1u32)
+            .wrapping_mul(0x180u32)
+            .wrapping_add(run_values);
+        let loaded_5 = first_j;
+        let j = loaded_5.wrapping_add(sample_lane);
+        if j < lane_count {
             let _block = machine.block(line!(), 13);
             rotation = <[M::F; 4]>::default();
-            let loaded_14 = item.count;
-            let loaded_15 = item.key;
-            if (loaded_14 < NEEDS_CARE) & ((j != 0u32) | (loaded_15 == NO_KEY)) {
-                let _block = machine.block(line!(), 3);
-                let loaded_16 = item;
-                let result_3 =
-                    evaluate_near_polynomial_segment(machine, loaded_16, segment, constant, j);
+            let loaded_6 = item.count;
+            let loaded_7 = item.key;
+            if (loaded_6 < NEEDS_CARE) & ((j != 0u32) | (loaded_7 == NO_KEY)) {
+                let _block = machine.block(line!(), 6);
+                let loaded_8 = item;
+                let loaded_9 = item.first;
+                let result_3 = evaluate_near_polynomial_segment(
+                    machine,
+                    loaded_8,
+                    segment,
+                    constant,
+                    loaded_9.wrapping_add(j as i32),
+                );
                 rotation = result_3;
             } else {
                 let _block = machine.block(line!(), 3);
-                let loaded_17 = item;
+                let loaded_10 = item;
                 let result_4 =
-                    sample_of_polynomial_segment(machine, loaded_17, segment, j, group[2]);
+                    sample_of_polynomial_segment(machine, loaded_10, segment, j, repetition);
                 rotation = result_4;
             }
-            let loaded_18 = rotation;
-            let result_5 = parts_1(machine, loaded_18);
-            all = result_5;
+            let loaded_11 = rotation;
+            let result_5 = parts_1(machine, loaded_11);
+            all_parts = result_5;
             part = 0u32;
             loop {
                 let _block = machine.block(line!(), 13);
-                let loaded_19 = part;
-                if !(loaded_19 < 3u32) {
+                let loaded_12 = part;
+                if !(loaded_12 < 3u32) {
                     break;
                 }
-                let loaded_20 = part;
-                let loaded_21 = part;
-                let loaded_22 = all[loaded_21 as usize];
+                let loaded_13 = part;
+                let loaded_14 = part;
+                let loaded_15 = all_parts[loaded_14 as usize];
                 machine.store::<M::F>(
                     Global::Tile,
                     values
                         .wrapping_add(lane.wrapping_mul(3u32))
-                        .wrapping_add(loaded_20) as usize,
-                    loaded_22,
+                        .wrapping_add(loaded_13) as usize,
+                    loaded_15,
                 );
-                let loaded_23 = part;
-                part = loaded_23.wrapping_add(1u32);
+                let loaded_16 = part;
+                part = loaded_16.wrapping_add(1u32);
             }
         }
         barrier().await;
-        let loaded_24 = end;
-        let loaded_25 = begin;
-        let loaded_26 = end;
-        if (loaded_24.wrapping_sub(loaded_25) == line_lanes) & (loaded_26 <= count) {
-            let _block = machine.block(line!(), 6);
+        let loaded_17 = first_j;
+        if loaded_17 < filling {
+            let _block = machine.block(line!(), 5);
             let found = values.wrapping_add(lane_part);
-            let loaded_27 = begin;
-            let stored = first
-                .wrapping_add(loaded_27)
-                .wrapping_mul(3u32)
-                .wrapping_add(lane_part);
+            let loaded_18 = first_j;
+            let stored = first_part.wrapping_add(loaded_18.wrapping_mul(stride));
             part_2 = 0u32;
             loop {
                 let _block = machine.block(line!(), 14);
-                let loaded_28 = part_2;
-                if !(loaded_28 < 3u32) {
+                let loaded_19 = part_2;
+                if !(loaded_19 < 3u32) {
                     break;
                 }
-                let loaded_29 = part_2;
-                let loaded_30 = part_2;
-                let loaded_31 = machine.load::<M::F>(
+                let loaded_20 = part_2;
+                let loaded_21 = part_2;
+                let loaded_22 = machine.load::<M::F>(
                     Global::Tile,
-                    found.wrapping_add(loaded_30.wrapping_mul(LINE)) as usize,
+                    found.wrapping_add(loaded_21.wrapping_mul(LINE)) as usize,
                 );
                 machine.store::<M::F>(
                     Global::Rotations,
-                    stored.wrapping_add(loaded_29.wrapping_mul(LINE)) as usize,
-                    loaded_31,
+                    stored.wrapping_add(loaded_20.wrapping_mul(LINE)) as usize,
+                    loaded_22,
                 );
-                let loaded_32 = part_2;
-                part_2 = loaded_32.wrapping_add(1u32);
+                let loaded_23 = part_2;
+                part_2 = loaded_23.wrapping_add(1u32);
             }
         } else {
-            let _block = machine.block(line!(), 13);
-            let loaded_33 = end;
-            let shift = values.wrapping_add(lanes.wrapping_sub(loaded_33).wrapping_mul(3u32));
-            let loaded_34 = end;
-            let loaded_35 = end;
-            let parts_end = (if count < loaded_35 { count } else { loaded_34 }).wrapping_mul(3u32);
-            let loaded_36 = begin;
-            part_3 = loaded_36.wrapping_mul(3u32).wrapping_add(lane);
+            let _block = machine.block(line!(), 18);
+            let loaded_24 = first_j;
+            let loaded_25 = first_j;
+            let first_lane = if (loaded_25 as i32) < 0i32 {
+                0u32.wrapping_sub(loaded_24)
+            } else {
+                0u32
+            };
+            let loaded_26 = first_j;
+            let last_j = loaded_26.wrapping_add(all.sample_mask);
+            end_lane = used_lanes;
+            if last_j >= count {
+                let _block = machine.block(line!(), 11);
+                let missing = if all.track_mask != 0u32 {
+                    lanes
+                } else {
+                    last_j.wrapping_add(1u32).wrapping_sub(count)
+                };
+                let loaded_27 = end_lane;
+                let loaded_28 = end_lane;
+                let loaded_29 = end_lane;
+                end_lane = loaded_27.wrapping_sub(if missing > loaded_29 {
+                    loaded_28
+                } else {
+                    missing
+                });
+            }
+            let loaded_30 = first_j;
+            let stored_2 = first
+                .wrapping_mul(3u32)
+                .wrapping_add(loaded_30.wrapping_mul(stride));
+            part_3 = first_lane.wrapping_mul(3u32).wrapping_add(lane);
             loop {
-                let _block = machine.block(line!(), 13);
-                let loaded_37 = part_3;
-                if !(loaded_37 < parts_end) {
+                let _block = machine.block(line!(), 14);
+                let loaded_31 = part_3;
+                let loaded_32 = end_lane;
+                if !(loaded_31 < loaded_32.wrapping_mul(3u32)) {
                     break;
                 }
-                let loaded_38 = part_3;
-                let loaded_39 = part_3;
-                let loaded_40 =
-                    machine.load::<M::F>(Global::Tile, shift.wrapping_add(loaded_39) as usize);
+                let loaded_33 = part_3;
+                let loaded_34 = part_3;
+                let loaded_35 =
+                    machine.load::<M::F>(Global::Tile, values.wrapping_add(loaded_34) as usize);
                 machine.store::<M::F>(
                     Global::Rotations,
-                    first.wrapping_mul(3u32).wrapping_add(loaded_38) as usize,
-                    loaded_40,
+                    stored_2.wrapping_add(loaded_33) as usize,
+                    loaded_35,
                 );
-                let loaded_41 = part_3;
-                part_3 = loaded_41.wrapping_add(lanes);
+                let loaded_36 = part_3;
+                part_3 = loaded_36.wrapping_add(lanes);
             }
         }
-        let loaded_42 = end;
-        begin = loaded_42;
-        let loaded_43 = end;
-        end = loaded_43.wrapping_add(lanes);
-        let loaded_44 = iteration;
-        iteration = loaded_44.wrapping_add(1u32);
-        let loaded_45 = iteration;
-        if loaded_45 >= iterations {
+        let loaded_37 = first_j;
+        first_j = loaded_37.wrapping_add(all.step);
+        let loaded_38 = iteration;
+        iteration = loaded_38.wrapping_add(1u32);
+        let loaded_39 = iteration;
+        if loaded_39 >= iterations {
             break;
         }
     }
@@ -3851,183 +4210,209 @@ pub(crate) async fn main_of_together_4<M: Machine>(machine: &M) {
 
 pub(crate) async fn main_of_together_5<M: Machine>(machine: &M) {
     let group = machine.ids().workgroup_id;
-    let groups = machine.ids().num_workgroups;
     let invocation = machine.ids().local_invocation_index;
     let mut item: SpreadRun<M::F> = Default::default();
-    let mut begin: u32 = 0u32;
-    let mut end: u32 = Default::default();
+    let mut first_j: u32 = Default::default();
     let mut iteration: u32 = 0u32;
     let mut rotation: [M::F; 4] = Default::default();
-    let mut all: [M::F; 9] = Default::default();
+    let mut all_parts: [M::F; 9] = Default::default();
     let mut part: u32 = Default::default();
     let mut part_2: u32 = Default::default();
+    let mut end_lane: u32 = Default::default();
     let mut part_3: u32 = Default::default();
-    let _block = machine.block(line!(), 41);
-    let loaded = machine.load::<u32>(Global::Dispatch, 4);
-    let lanes = 1u32 << loaded;
-    let workgroup = group[1].wrapping_mul(groups[0]).wrapping_add(group[0]);
-    let loaded_2 = machine.load::<u32>(Global::Dispatch, 4);
-    let first_index = workgroup.wrapping_mul(SPREAD_WORKGROUP >> loaded_2);
-    let loaded_3 = machine.load::<u32>(Global::Dispatch, 2);
-    if first_index >= loaded_3 {
+    let _block = machine.block(line!(), 58);
+    let all = machine.load::<Spread>(Global::Dispatch, 0);
+    let lanes = 1u32 << all.lanes_log2;
+    let first_index = group[0].wrapping_mul(SPREAD_WORKGROUP >> all.lanes_log2);
+    if first_index >= all.item_count {
         return;
     }
-    let loaded_4 = machine.load::<u32>(Global::Dispatch, 1);
-    let result = item_at_spread_run(machine, loaded_4.wrapping_add(first_index));
+    let result = item_at_spread_run(machine, all.first_item.wrapping_add(first_index));
     let iterations = result.iterations;
-    let loaded_5 = machine.load::<u32>(Global::Dispatch, 4);
-    let index = first_index.wrapping_add(invocation >> loaded_5);
-    let loaded_6 = machine.load::<u32>(Global::Dispatch, 2);
-    if index < loaded_6 {
-        let _block = machine.block(line!(), 4);
-        let loaded_7 = machine.load::<u32>(Global::Dispatch, 1);
-        let result_2 = item_at_spread_run(machine, loaded_7.wrapping_add(index));
+    let index = first_index.wrapping_add(invocation >> all.lanes_log2);
+    if index < all.item_count {
+        let _block = machine.block(line!(), 3);
+        let result_2 = item_at_spread_run(machine, all.first_item.wrapping_add(index));
         item = result_2;
     }
-    let loaded_8 = item;
-    let location = location_of(machine, loaded_8, group[2]);
-    let loaded_9 = item.count;
-    let segment = segment_at_polynomial_segment(
-        machine,
-        if loaded_9 & IS_CONSTANT != 0u32 {
-            0u32
-        } else {
-            location[0]
-        },
-    );
+    let first_repetition = group[2].wrapping_mul(all.layer_repetitions);
+    let repetition = first_repetition.wrapping_add(invocation & all.track_mask);
+    let is_there = repetition < all.repetitions;
+    let loaded = item;
+    let location = location_of(machine, loaded, repetition);
+    let loaded_2 = item.count;
+    let has_segment = is_there & (loaded_2 & IS_CONSTANT == 0u32);
+    let segment =
+        segment_at_polynomial_segment(machine, if has_segment { location[0] } else { 0u32 });
     let constant = constant_of_polynomial_segment(machine, segment);
-    let loaded_10 = item;
-    let count = sample_count(machine, loaded_10);
-    let first = location[1];
-    let loaded_11 = machine.load::<u32>(Global::Dispatch, 5);
-    let idle = first & loaded_11;
+    let loaded_3 = item;
+    let count = sample_count(machine, loaded_3);
+    let lane_count = if is_there { count } else { 0u32 };
+    let tracks = all.repetitions.wrapping_sub(first_repetition);
+    let used_lanes = if (all.track_mask != 0u32) & (tracks < lanes) {
+        tracks
+    } else {
+        lanes
+    };
     let lane = invocation & lanes.wrapping_sub(1u32);
+    let run_values = invocation.wrapping_sub(lane).wrapping_mul(9u32);
     let lane_part = (lane & 0xfffffff8u32)
         .wrapping_mul(9u32)
         .wrapping_add(lane & 7u32);
-    let line_lanes = if lanes >= LINE { lanes } else { 0u32 };
-    end = lanes.wrapping_sub(idle);
+    let first = location[1].wrapping_sub((invocation & all.track_mask).wrapping_mul(all.outputs));
+    let first_part = first.wrapping_mul(9u32).wrapping_add(lane_part);
+    let stride = all.stride.wrapping_mul(9u32);
+    let fills_lines = (lanes >= LINE) & (used_lanes == lanes) & (count > all.sample_mask);
+    let filling = if fills_lines {
+        count.wrapping_sub(all.sample_mask)
+    } else {
+        0u32
+    };
+    let sample_lane = invocation & all.sample_mask;
+    first_j = 0u32.wrapping_sub(first & all.line_mask);
     loop {
-        let _block = machine.block(line!(), 30);
-        let loaded_12 = iteration;
-        let values = (loaded_12 & 1u32)
-            .wrapping_mul(SPREAD_WORKGROUP)
-            .wrapping_add(invocation)
-            .wrapping_sub(lane)
-            .wrapping_mul(9u32);
-        let loaded_13 = end;
-        let j = loaded_13.wrapping_sub(lanes).wrapping_add(lane);
-        if j < count {
+        let _block = machine.block(line!(), 20);
+        let loaded_4 = iteration;
+        let values = (loaded_4 & 1u32)
+            .wrapping_mul(0x480u32)
+            .wrapping_add(run_values);
+        let loaded_5 = first_j;
+        let j = loaded_5.wrapping_add(sample_lane);
+        if j < lane_count {
             let _block = machine.block(line!(), 13);
             rotation = <[M::F; 4]>::default();
-            let loaded_14 = item.count;
-            let loaded_15 = item.key;
-            if (loaded_14 < NEEDS_CARE) & ((j != 0u32) | (loaded_15 == NO_KEY)) {
-                let _block = machine.block(line!(), 3);
-                let loaded_16 = item;
-                let result_3 =
-                    evaluate_near_polynomial_segment(machine, loaded_16, segment, constant, j);
+            let loaded_6 = item.count;
+            let loaded_7 = item.key;
+            if (loaded_6 < NEEDS_CARE) & ((j != 0u32) | (loaded_7 == NO_KEY)) {
+                let _block = machine.block(line!(), 6);
+                let loaded_8 = item;
+                let loaded_9 = item.first;
+                let result_3 = evaluate_near_polynomial_segment(
+                    machine,
+                    loaded_8,
+                    segment,
+                    constant,
+                    loaded_9.wrapping_add(j as i32),
+                );
                 rotation = result_3;
             } else {
                 let _block = machine.block(line!(), 3);
-                let loaded_17 = item;
+                let loaded_10 = item;
                 let result_4 =
-                    sample_of_polynomial_segment(machine, loaded_17, segment, j, group[2]);
+                    sample_of_polynomial_segment(machine, loaded_10, segment, j, repetition);
                 rotation = result_4;
             }
-            let loaded_18 = rotation;
-            let result_5 = parts_2(machine, loaded_18);
-            all = result_5;
+            let loaded_11 = rotation;
+            let result_5 = parts_2(machine, loaded_11);
+            all_parts = result_5;
             part = 0u32;
             loop {
                 let _block = machine.block(line!(), 13);
-                let loaded_19 = part;
-                if !(loaded_19 < 9u32) {
+                let loaded_12 = part;
+                if !(loaded_12 < 9u32) {
                     break;
                 }
-                let loaded_20 = part;
-                let loaded_21 = part;
-                let loaded_22 = all[loaded_21 as usize];
+                let loaded_13 = part;
+                let loaded_14 = part;
+                let loaded_15 = all_parts[loaded_14 as usize];
                 machine.store::<M::F>(
                     Global::Tile,
                     values
                         .wrapping_add(lane.wrapping_mul(9u32))
-                        .wrapping_add(loaded_20) as usize,
-                    loaded_22,
+                        .wrapping_add(loaded_13) as usize,
+                    loaded_15,
                 );
-                let loaded_23 = part;
-                part = loaded_23.wrapping_add(1u32);
+                let loaded_16 = part;
+                part = loaded_16.wrapping_add(1u32);
             }
         }
         barrier().await;
-        let loaded_24 = end;
-        let loaded_25 = begin;
-        let loaded_26 = end;
-        if (loaded_24.wrapping_sub(loaded_25) == line_lanes) & (loaded_26 <= count) {
-            let _block = machine.block(line!(), 6);
+        let loaded_17 = first_j;
+        if loaded_17 < filling {
+            let _block = machine.block(line!(), 5);
             let found = values.wrapping_add(lane_part);
-            let loaded_27 = begin;
-            let stored = first
-                .wrapping_add(loaded_27)
-                .wrapping_mul(9u32)
-                .wrapping_add(lane_part);
+            let loaded_18 = first_j;
+            let stored = first_part.wrapping_add(loaded_18.wrapping_mul(stride));
             part_2 = 0u32;
             loop {
                 let _block = machine.block(line!(), 14);
-                let loaded_28 = part_2;
-                if !(loaded_28 < 9u32) {
+                let loaded_19 = part_2;
+                if !(loaded_19 < 9u32) {
                     break;
                 }
-                let loaded_29 = part_2;
-                let loaded_30 = part_2;
-                let loaded_31 = machine.load::<M::F>(
+                let loaded_20 = part_2;
+                let loaded_21 = part_2;
+                let loaded_22 = machine.load::<M::F>(
                     Global::Tile,
-                    found.wrapping_add(loaded_30.wrapping_mul(LINE)) as usize,
+                    found.wrapping_add(loaded_21.wrapping_mul(LINE)) as usize,
                 );
                 machine.store::<M::F>(
                     Global::Rotations,
-                    stored.wrapping_add(loaded_29.wrapping_mul(LINE)) as usize,
-                    loaded_31,
+                    stored.wrapping_add(loaded_20.wrapping_mul(LINE)) as usize,
+                    loaded_22,
                 );
-                let loaded_32 = part_2;
-                part_2 = loaded_32.wrapping_add(1u32);
+                let loaded_23 = part_2;
+                part_2 = loaded_23.wrapping_add(1u32);
             }
         } else {
-            let _block = machine.block(line!(), 13);
-            let loaded_33 = end;
-            let shift = values.wrapping_add(lanes.wrapping_sub(loaded_33).wrapping_mul(9u32));
-            let loaded_34 = end;
-            let loaded_35 = end;
-            let parts_end = (if count < loaded_35 { count } else { loaded_34 }).wrapping_mul(9u32);
-            let loaded_36 = begin;
-            part_3 = loaded_36.wrapping_mul(9u32).wrapping_add(lane);
+            let _block = machine.block(line!(), 18);
+            let loaded_24 = first_j;
+            let loaded_25 = first_j;
+            let first_lane = if (loaded_25 as i32) < 0i32 {
+                0u32.wrapping_sub(loaded_24)
+            } else {
+                0u32
+            };
+            let loaded_26 = first_j;
+            let last_j = loaded_26.wrapping_add(all.sample_mask);
+            end_lane = used_lanes;
+            if last_j >= count {
+                let _block = machine.block(line!(), 11);
+                let missing = if all.track_mask != 0u32 {
+                    lanes
+                } else {
+                    last_j.wrapping_add(1u32).wrapping_sub(count)
+                };
+                let loaded_27 = end_lane;
+                let loaded_28 = end_lane;
+                let loaded_29 = end_lane;
+                end_lane = loaded_27.wrapping_sub(if missing > loaded_29 {
+                    loaded_28
+                } else {
+                    missing
+                });
+            }
+            let loaded_30 = first_j;
+            let stored_2 = first
+                .wrapping_mul(9u32)
+                .wrapping_add(loaded_30.wrapping_mul(stride));
+            part_3 = first_lane.wrapping_mul(9u32).wrapping_add(lane);
             loop {
-                let _block = machine.block(line!(), 13);
-                let loaded_37 = part_3;
-                if !(loaded_37 < parts_end) {
+                let _block = machine.block(line!(), 14);
+                let loaded_31 = part_3;
+                let loaded_32 = end_lane;
+                if !(loaded_31 < loaded_32.wrapping_mul(9u32)) {
                     break;
                 }
-                let loaded_38 = part_3;
-                let loaded_39 = part_3;
-                let loaded_40 =
-                    machine.load::<M::F>(Global::Tile, shift.wrapping_add(loaded_39) as usize);
+                let loaded_33 = part_3;
+                let loaded_34 = part_3;
+                let loaded_35 =
+                    machine.load::<M::F>(Global::Tile, values.wrapping_add(loaded_34) as usize);
                 machine.store::<M::F>(
                     Global::Rotations,
-                    first.wrapping_mul(9u32).wrapping_add(loaded_38) as usize,
-                    loaded_40,
+                    stored_2.wrapping_add(loaded_33) as usize,
+                    loaded_35,
                 );
-                let loaded_41 = part_3;
-                part_3 = loaded_41.wrapping_add(lanes);
+                let loaded_36 = part_3;
+                part_3 = loaded_36.wrapping_add(lanes);
             }
         }
-        let loaded_42 = end;
-        begin = loaded_42;
-        let loaded_43 = end;
-        end = loaded_43.wrapping_add(lanes);
-        let loaded_44 = iteration;
-        iteration = loaded_44.wrapping_add(1u32);
-        let loaded_45 = iteration;
-        if loaded_45 >= iterations {
+        let loaded_37 = first_j;
+        first_j = loaded_37.wrapping_add(all.step);
+        let loaded_38 = iteration;
+        iteration = loaded_38.wrapping_add(1u32);
+        let loaded_39 = iteration;
+        if loaded_39 >= iterations {
             break;
         }
     }
@@ -4035,183 +4420,209 @@ pub(crate) async fn main_of_together_5<M: Machine>(machine: &M) {
 
 pub(crate) async fn main_of_together_6<M: Machine>(machine: &M) {
     let group = machine.ids().workgroup_id;
-    let groups = machine.ids().num_workgroups;
     let invocation = machine.ids().local_invocation_index;
     let mut item: SpreadRun<M::F> = Default::default();
-    let mut begin: u32 = 0u32;
-    let mut end: u32 = Default::default();
+    let mut first_j: u32 = Default::default();
     let mut iteration: u32 = 0u32;
     let mut rotation: [M::F; 4] = Default::default();
-    let mut all: [[M::F; 4]; 3] = Default::default();
+    let mut all_parts: [[M::F; 4]; 3] = Default::default();
     let mut part: u32 = Default::default();
     let mut part_2: u32 = Default::default();
+    let mut end_lane: u32 = Default::default();
     let mut part_3: u32 = Default::default();
-    let _block = machine.block(line!(), 41);
-    let loaded = machine.load::<u32>(Global::Dispatch, 4);
-    let lanes = 1u32 << loaded;
-    let workgroup = group[1].wrapping_mul(groups[0]).wrapping_add(group[0]);
-    let loaded_2 = machine.load::<u32>(Global::Dispatch, 4);
-    let first_index = workgroup.wrapping_mul(SPREAD_WORKGROUP >> loaded_2);
-    let loaded_3 = machine.load::<u32>(Global::Dispatch, 2);
-    if first_index >= loaded_3 {
+    let _block = machine.block(line!(), 58);
+    let all = machine.load::<Spread>(Global::Dispatch, 0);
+    let lanes = 1u32 << all.lanes_log2;
+    let first_index = group[0].wrapping_mul(SPREAD_WORKGROUP >> all.lanes_log2);
+    if first_index >= all.item_count {
         return;
     }
-    let loaded_4 = machine.load::<u32>(Global::Dispatch, 1);
-    let result = item_at_spread_run(machine, loaded_4.wrapping_add(first_index));
+    let result = item_at_spread_run(machine, all.first_item.wrapping_add(first_index));
     let iterations = result.iterations;
-    let loaded_5 = machine.load::<u32>(Global::Dispatch, 4);
-    let index = first_index.wrapping_add(invocation >> loaded_5);
-    let loaded_6 = machine.load::<u32>(Global::Dispatch, 2);
-    if index < loaded_6 {
-        let _block = machine.block(line!(), 4);
-        let loaded_7 = machine.load::<u32>(Global::Dispatch, 1);
-        let result_2 = item_at_spread_run(machine, loaded_7.wrapping_add(index));
+    let index = first_index.wrapping_add(invocation >> all.lanes_log2);
+    if index < all.item_count {
+        let _block = machine.block(line!(), 3);
+        let result_2 = item_at_spread_run(machine, all.first_item.wrapping_add(index));
         item = result_2;
     }
-    let loaded_8 = item;
-    let location = location_of(machine, loaded_8, group[2]);
-    let loaded_9 = item.count;
-    let segment = segment_at_polynomial_segment(
-        machine,
-        if loaded_9 & IS_CONSTANT != 0u32 {
-            0u32
-        } else {
-            location[0]
-        },
-    );
+    let first_repetition = group[2].wrapping_mul(all.layer_repetitions);
+    let repetition = first_repetition.wrapping_add(invocation & all.track_mask);
+    let is_there = repetition < all.repetitions;
+    let loaded = item;
+    let location = location_of(machine, loaded, repetition);
+    let loaded_2 = item.count;
+    let has_segment = is_there & (loaded_2 & IS_CONSTANT == 0u32);
+    let segment =
+        segment_at_polynomial_segment(machine, if has_segment { location[0] } else { 0u32 });
     let constant = constant_of_polynomial_segment(machine, segment);
-    let loaded_10 = item;
-    let count = sample_count(machine, loaded_10);
-    let first = location[1];
-    let loaded_11 = machine.load::<u32>(Global::Dispatch, 5);
-    let idle = first & loaded_11;
+    let loaded_3 = item;
+    let count = sample_count(machine, loaded_3);
+    let lane_count = if is_there { count } else { 0u32 };
+    let tracks = all.repetitions.wrapping_sub(first_repetition);
+    let used_lanes = if (all.track_mask != 0u32) & (tracks < lanes) {
+        tracks
+    } else {
+        lanes
+    };
     let lane = invocation & lanes.wrapping_sub(1u32);
+    let run_values = invocation.wrapping_sub(lane).wrapping_mul(3u32);
     let lane_part = (lane & 0xfffffff8u32)
         .wrapping_mul(3u32)
         .wrapping_add(lane & 7u32);
-    let line_lanes = if lanes >= LINE { lanes } else { 0u32 };
-    end = lanes.wrapping_sub(idle);
+    let first = location[1].wrapping_sub((invocation & all.track_mask).wrapping_mul(all.outputs));
+    let first_part = first.wrapping_mul(3u32).wrapping_add(lane_part);
+    let stride = all.stride.wrapping_mul(3u32);
+    let fills_lines = (lanes >= LINE) & (used_lanes == lanes) & (count > all.sample_mask);
+    let filling = if fills_lines {
+        count.wrapping_sub(all.sample_mask)
+    } else {
+        0u32
+    };
+    let sample_lane = invocation & all.sample_mask;
+    first_j = 0u32.wrapping_sub(first & all.line_mask);
     loop {
-        let _block = machine.block(line!(), 30);
-        let loaded_12 = iteration;
-        let values = (loaded_12 & 1u32)
-            .wrapping_mul(SPREAD_WORKGROUP)
-            .wrapping_add(invocation)
-            .wrapping_sub(lane)
-            .wrapping_mul(3u32);
-        let loaded_13 = end;
-        let j = loaded_13.wrapping_sub(lanes).wrapping_add(lane);
-        if j < count {
+        let _block = machine.block(line!(), 20);
+        let loaded_4 = iteration;
+        let values = (loaded_4 & 1u32)
+            .wrapping_mul(0x180u32)
+            .wrapping_add(run_values);
+        let loaded_5 = first_j;
+        let j = loaded_5.wrapping_add(sample_lane);
+        if j < lane_count {
             let _block = machine.block(line!(), 13);
             rotation = <[M::F; 4]>::default();
-            let loaded_14 = item.count;
-            let loaded_15 = item.key;
-            if (loaded_14 < NEEDS_CARE) & ((j != 0u32) | (loaded_15 == NO_KEY)) {
-                let _block = machine.block(line!(), 3);
-                let loaded_16 = item;
-                let result_3 =
-                    evaluate_near_polynomial_segment(machine, loaded_16, segment, constant, j);
+            let loaded_6 = item.count;
+            let loaded_7 = item.key;
+            if (loaded_6 < NEEDS_CARE) & ((j != 0u32) | (loaded_7 == NO_KEY)) {
+                let _block = machine.block(line!(), 6);
+                let loaded_8 = item;
+                let loaded_9 = item.first;
+                let result_3 = evaluate_near_polynomial_segment(
+                    machine,
+                    loaded_8,
+                    segment,
+                    constant,
+                    loaded_9.wrapping_add(j as i32),
+                );
                 rotation = result_3;
             } else {
                 let _block = machine.block(line!(), 3);
-                let loaded_17 = item;
+                let loaded_10 = item;
                 let result_4 =
-                    sample_of_polynomial_segment(machine, loaded_17, segment, j, group[2]);
+                    sample_of_polynomial_segment(machine, loaded_10, segment, j, repetition);
                 rotation = result_4;
             }
-            let loaded_18 = rotation;
-            let result_5 = parts_3(machine, loaded_18);
-            all = result_5;
+            let loaded_11 = rotation;
+            let result_5 = parts_3(machine, loaded_11);
+            all_parts = result_5;
             part = 0u32;
             loop {
                 let _block = machine.block(line!(), 13);
-                let loaded_19 = part;
-                if !(loaded_19 < 3u32) {
+                let loaded_12 = part;
+                if !(loaded_12 < 3u32) {
                     break;
                 }
-                let loaded_20 = part;
-                let loaded_21 = part;
-                let loaded_22 = all[loaded_21 as usize];
+                let loaded_13 = part;
+                let loaded_14 = part;
+                let loaded_15 = all_parts[loaded_14 as usize];
                 machine.store::<[M::F; 4]>(
                     Global::Tile,
                     4 * (values
                         .wrapping_add(lane.wrapping_mul(3u32))
-                        .wrapping_add(loaded_20) as usize),
-                    loaded_22,
+                        .wrapping_add(loaded_13) as usize),
+                    loaded_15,
                 );
-                let loaded_23 = part;
-                part = loaded_23.wrapping_add(1u32);
+                let loaded_16 = part;
+                part = loaded_16.wrapping_add(1u32);
             }
         }
         barrier().await;
-        let loaded_24 = end;
-        let loaded_25 = begin;
-        let loaded_26 = end;
-        if (loaded_24.wrapping_sub(loaded_25) == line_lanes) & (loaded_26 <= count) {
-            let _block = machine.block(line!(), 6);
+        let loaded_17 = first_j;
+        if loaded_17 < filling {
+            let _block = machine.block(line!(), 5);
             let found = values.wrapping_add(lane_part);
-            let loaded_27 = begin;
-            let stored = first
-                .wrapping_add(loaded_27)
-                .wrapping_mul(3u32)
-                .wrapping_add(lane_part);
+            let loaded_18 = first_j;
+            let stored = first_part.wrapping_add(loaded_18.wrapping_mul(stride));
             part_2 = 0u32;
             loop {
                 let _block = machine.block(line!(), 14);
-                let loaded_28 = part_2;
-                if !(loaded_28 < 3u32) {
+                let loaded_19 = part_2;
+                if !(loaded_19 < 3u32) {
                     break;
                 }
-                let loaded_29 = part_2;
-                let loaded_30 = part_2;
-                let loaded_31 = machine.load::<[M::F; 4]>(
+                let loaded_20 = part_2;
+                let loaded_21 = part_2;
+                let loaded_22 = machine.load::<[M::F; 4]>(
                     Global::Tile,
-                    4 * (found.wrapping_add(loaded_30.wrapping_mul(LINE)) as usize),
+                    4 * (found.wrapping_add(loaded_21.wrapping_mul(LINE)) as usize),
                 );
                 machine.store::<[M::F; 4]>(
                     Global::Rotations,
-                    4 * (stored.wrapping_add(loaded_29.wrapping_mul(LINE)) as usize),
-                    loaded_31,
+                    4 * (stored.wrapping_add(loaded_20.wrapping_mul(LINE)) as usize),
+                    loaded_22,
                 );
-                let loaded_32 = part_2;
-                part_2 = loaded_32.wrapping_add(1u32);
+                let loaded_23 = part_2;
+                part_2 = loaded_23.wrapping_add(1u32);
             }
         } else {
-            let _block = machine.block(line!(), 13);
-            let loaded_33 = end;
-            let shift = values.wrapping_add(lanes.wrapping_sub(loaded_33).wrapping_mul(3u32));
-            let loaded_34 = end;
-            let loaded_35 = end;
-            let parts_end = (if count < loaded_35 { count } else { loaded_34 }).wrapping_mul(3u32);
-            let loaded_36 = begin;
-            part_3 = loaded_36.wrapping_mul(3u32).wrapping_add(lane);
+            let _block = machine.block(line!(), 18);
+            let loaded_24 = first_j;
+            let loaded_25 = first_j;
+            let first_lane = if (loaded_25 as i32) < 0i32 {
+                0u32.wrapping_sub(loaded_24)
+            } else {
+                0u32
+            };
+            let loaded_26 = first_j;
+            let last_j = loaded_26.wrapping_add(all.sample_mask);
+            end_lane = used_lanes;
+            if last_j >= count {
+                let _block = machine.block(line!(), 11);
+                let missing = if all.track_mask != 0u32 {
+                    lanes
+                } else {
+                    last_j.wrapping_add(1u32).wrapping_sub(count)
+                };
+                let loaded_27 = end_lane;
+                let loaded_28 = end_lane;
+                let loaded_29 = end_lane;
+                end_lane = loaded_27.wrapping_sub(if missing > loaded_29 {
+                    loaded_28
+                } else {
+                    missing
+                });
+            }
+            let loaded_30 = first_j;
+            let stored_2 = first
+                .wrapping_mul(3u32)
+                .wrapping_add(loaded_30.wrapping_mul(stride));
+            part_3 = first_lane.wrapping_mul(3u32).wrapping_add(lane);
             loop {
-                let _block = machine.block(line!(), 13);
-                let loaded_37 = part_3;
-                if !(loaded_37 < parts_end) {
+                let _block = machine.block(line!(), 14);
+                let loaded_31 = part_3;
+                let loaded_32 = end_lane;
+                if !(loaded_31 < loaded_32.wrapping_mul(3u32)) {
                     break;
                 }
-                let loaded_38 = part_3;
-                let loaded_39 = part_3;
-                let loaded_40 = machine
-                    .load::<[M::F; 4]>(Global::Tile, 4 * (shift.wrapping_add(loaded_39) as usize));
+                let loaded_33 = part_3;
+                let loaded_34 = part_3;
+                let loaded_35 = machine
+                    .load::<[M::F; 4]>(Global::Tile, 4 * (values.wrapping_add(loaded_34) as usize));
                 machine.store::<[M::F; 4]>(
                     Global::Rotations,
-                    4 * (first.wrapping_mul(3u32).wrapping_add(loaded_38) as usize),
-                    loaded_40,
+                    4 * (stored_2.wrapping_add(loaded_33) as usize),
+                    loaded_35,
                 );
-                let loaded_41 = part_3;
-                part_3 = loaded_41.wrapping_add(lanes);
+                let loaded_36 = part_3;
+                part_3 = loaded_36.wrapping_add(lanes);
             }
         }
-        let loaded_42 = end;
-        begin = loaded_42;
-        let loaded_43 = end;
-        end = loaded_43.wrapping_add(lanes);
-        let loaded_44 = iteration;
-        iteration = loaded_44.wrapping_add(1u32);
-        let loaded_45 = iteration;
-        if loaded_45 >= iterations {
+        let loaded_37 = first_j;
+        first_j = loaded_37.wrapping_add(all.step);
+        let loaded_38 = iteration;
+        iteration = loaded_38.wrapping_add(1u32);
+        let loaded_39 = iteration;
+        if loaded_39 >= iterations {
             break;
         }
     }
@@ -4891,6 +5302,23 @@ pub(crate) async fn main_of_subgroup_rotations<M: Machine>(machine: &M) {
     }
 }
 
+pub(crate) async fn main_of_motion<M: Machine>(machine: &M) {
+    let invocation = machine.ids().global_invocation_id;
+    let groups = machine.ids().num_workgroups;
+    let _block = machine.block(line!(), 6);
+    let index = invocation[1]
+        .wrapping_mul(groups[0].wrapping_mul(MOTION_WORKGROUP))
+        .wrapping_add(invocation[0]);
+    let loaded = machine.load::<u32>(Global::Dispatch, 0);
+    if index < loaded {
+        let _block = machine.block(line!(), 1);
+        motion_work(machine, index);
+        return;
+    } else {
+        return;
+    }
+}
+
 pub(crate) async fn main_of_prepare_arcs<M: Machine>(machine: &M) {
     let invocation = machine.ids().global_invocation_id;
     let groups = machine.ids().num_workgroups;
@@ -4957,6 +5385,286 @@ pub(crate) fn matrix_rows<M: Machine>(
     loaded
 }
 
+pub(crate) fn motion_work<M: Machine>(machine: &M, index: u32) {
+    const OF_KERNELS: [u8; 198] = [
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 2, 3, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+    ];
+    match OF_KERNELS[machine.code()] {
+        0 => motion_work_of_joints(machine, index),
+        1 => motion_work_of_walk(machine, index),
+        2 => motion_work_of_differences(machine, index),
+        _ => motion_work_of_store(machine, index),
+    }
+}
+
+pub(crate) fn motion_work_of_joints<M: Machine>(machine: &M, index: u32) {
+    let _block = machine.block(line!(), 22);
+    let loaded = machine.load::<u32>(Global::Dispatch, 2);
+    let sample_index = quotient(index, loaded);
+    let loaded_2 = machine.load::<u32>(Global::Dispatch, 2);
+    let joint = index.wrapping_sub(sample_index.wrapping_mul(loaded_2));
+    let loaded_3 = machine.load::<u32>(Global::Dispatch, 1);
+    let sample = machine.load::<MotionSample>(
+        Global::Samples,
+        2 * (loaded_3.wrapping_add(sample_index) as usize),
+    );
+    let clip = machine.load::<CrowdClip>(Global::Clips, 3 * (sample.clip as usize));
+    let tick = if sample.tick > clip.period {
+        clip.period
+    } else {
+        sample.tick
+    };
+    let loaded_4 = machine.load::<u32>(Global::Dispatch, 2);
+    let first = sample
+        .clip
+        .wrapping_mul(loaded_4)
+        .wrapping_add(joint)
+        .wrapping_mul(CHANNELS);
+    let state = index.wrapping_mul(STATE_VECTORS);
+    let loaded_5 = machine.load::<CrowdChannel>(
+        Global::Channels,
+        4 * (first.wrapping_add(ROTATION) as usize),
+    );
+    rotate(machine, loaded_5, clip, tick, state);
+    let loaded_6 = machine.load::<CrowdChannel>(
+        Global::Channels,
+        4 * (first.wrapping_add(TRANSLATION) as usize),
+    );
+    move_joint(machine, loaded_6, clip, tick, state);
+}
+
+pub(crate) fn motion_work_of_walk<M: Machine>(machine: &M, index: u32) {
+    let mut i: u32 = 0u32;
+    let _block = machine.block(line!(), 2);
+    let loaded = machine.load::<u32>(Global::Dispatch, 2);
+    let first = index.wrapping_mul(loaded);
+    loop {
+        let _block = machine.block(line!(), 14);
+        let loaded_2 = i;
+        let loaded_3 = machine.load::<u32>(Global::Dispatch, 3);
+        if !(loaded_2 < loaded_3) {
+            break;
+        }
+        let loaded_4 = i;
+        let link = machine.load::<CrowdLink>(Global::Links, 2 * (loaded_4 as usize));
+        hang_on(
+            machine,
+            first.wrapping_add(link.parent).wrapping_mul(STATE_VECTORS),
+            first.wrapping_add(link.joint).wrapping_mul(STATE_VECTORS),
+        );
+        let loaded_5 = i;
+        i = loaded_5.wrapping_add(1u32);
+    }
+}
+
+pub(crate) fn motion_work_of_differences<M: Machine>(machine: &M, index: u32) {
+    let mut along: M::F = M::F::of(0.0);
+    let _block = machine.block(line!(), 51);
+    let loaded = machine.load::<u32>(Global::Dispatch, 1);
+    let loaded_2 = machine.load::<u32>(Global::Dispatch, 2);
+    let rate = machine.load::<M::F>(
+        Global::Rates,
+        loaded.wrapping_add(quotient(index, loaded_2)) as usize,
+    );
+    let loaded_3 = machine.load::<u32>(Global::Dispatch, 0);
+    let before = loaded_3.wrapping_add(index).wrapping_mul(STATE_VECTORS);
+    let loaded_4 = machine.load::<u32>(Global::Dispatch, 0);
+    let after = 2u32
+        .wrapping_mul(loaded_4)
+        .wrapping_add(index)
+        .wrapping_mul(STATE_VECTORS);
+    let state = index.wrapping_mul(STATE_VECTORS);
+    let loaded_5 =
+        machine.load::<[M::F; 4]>(Global::States, 4 * (after.wrapping_add(POSITION) as usize));
+    let loaded_6 =
+        machine.load::<[M::F; 4]>(Global::States, 4 * (before.wrapping_add(POSITION) as usize));
+    let moved = both(
+        [loaded_5[0], loaded_5[1], loaded_5[2]],
+        [loaded_6[0], loaded_6[1], loaded_6[2]],
+        |x, y| x - y,
+    );
+    let result = canonical3(machine, both(moved, [rate; 3], |x, y| x * y));
+    machine.store::<[M::F; 4]>(
+        Global::States,
+        4 * (state.wrapping_add(VELOCITY) as usize),
+        result,
+    );
+    let start = machine.load::<[M::F; 4]>(
+        Global::States,
+        4 * (before.wrapping_add(WORLD_ROTATION) as usize),
+    );
+    let loaded_7 = machine.load::<[M::F; 4]>(
+        Global::States,
+        4 * (after.wrapping_add(WORLD_ROTATION) as usize),
+    );
+    let result_2 = product(
+        machine,
+        loaded_7,
+        [
+            [start[0], start[1], start[2]].map(|x| -x)[0],
+            [start[0], start[1], start[2]].map(|x| -x)[1],
+            [start[0], start[1], start[2]].map(|x| -x)[2],
+            start[3],
+        ],
+    );
+    let rotation = flushed4(machine, result_2);
+    let sine = root(
+        machine,
+        (rotation[0] * rotation[0] + rotation[1] * rotation[1]) + rotation[2] * rotation[2],
+    );
+    if sine != M::F::of(0.0) {
+        let _block = machine.block(line!(), 6);
+        let result_3 = magnitude(machine, rotation[3]);
+        let result_4 = arc_tangent(machine, sine, result_3);
+        let result_5 = reciprocal(machine, sine);
+        along = (M::F::of(2.0) * result_4) * result_5;
+    }
+    let loaded_8 = along;
+    let loaded_9 = along;
+    let scale = if rotation[3] < M::F::of(0.0) {
+        -loaded_9
+    } else {
+        loaded_8
+    };
+    let result_6 = canonical3(
+        machine,
+        both(
+            [rotation[0], rotation[1], rotation[2]],
+            [scale * rate; 3],
+            |x, y| x * y,
+        ),
+    );
+    machine.store::<[M::F; 4]>(
+        Global::States,
+        4 * (state.wrapping_add(ANGULAR_VELOCITY) as usize),
+        result_6,
+    );
+}
+
+/// `index` is a number of the result.
+pub(crate) fn motion_work_of_store<M: Machine>(machine: &M, index: u32) {
+    let _block = machine.block(line!(), 12);
+    let loaded = machine.load::<u32>(Global::Dispatch, 7);
+    let joint = quotient(index, loaded);
+    let loaded_2 = machine.load::<u32>(Global::Dispatch, 6);
+    let vector = joint.wrapping_mul(STATE_VECTORS).wrapping_add(loaded_2);
+    let loaded_3 = machine.load::<u32>(Global::Dispatch, 7);
+    let loaded_4 = machine.load::<u32>(
+        Global::States,
+        vector
+            .wrapping_mul(4u32)
+            .wrapping_add(index.wrapping_sub(joint.wrapping_mul(loaded_3))) as usize,
+    );
+    machine.store::<u32>(Global::Values, index as usize, loaded_4);
+}
+
+/// Stores the position and the velocity in the parent's frame.
+pub(crate) fn move_joint<M: Machine>(
+    machine: &M,
+    channel: CrowdChannel,
+    clip: CrowdClip,
+    tick: u32,
+    state: u32,
+) {
+    let mut value: [M::F; 4] = Default::default();
+    let mut velocity: [M::F; 4] = [M::F::of(0.0); 4];
+    let _block = machine.block(line!(), 16);
+    let base = machine.load::<CrowdBase>(
+        Global::TimeBases,
+        3 * (clip
+            .first_base
+            .wrapping_add(channel.form_and_base & 0xffffffu32) as usize),
+    );
+    let form = channel.form_and_base >> 24u32;
+    let position = position_in(machine, base, tick);
+    let span = position.span & TICKS;
+    let along = moving_span(machine, base, tick, span);
+    if form == FORM_LINE {
+        let _block = machine.block(line!(), 5);
+        let result = key_of(machine, channel, span);
+        value = result;
+        if position.span & ON_KEY == 0u32 {
+            let _block = machine.block(line!(), 7);
+            let loaded = value;
+            let result_2 = key_after(machine, channel, base, span);
+            let line = line_between(machine, loaded, result_2);
+            let result_3 = canonical(
+                machine,
+                both(
+                    both(line.slope, [position.parameter; 4], |x, y| x * y),
+                    line.value,
+                    |x, y| x + y,
+                ),
+            );
+            value = result_3;
+        }
+    } else {
+        let _block = machine.block(line!(), 2);
+        let result_4 = sampled(machine, channel, position);
+        value = result_4;
+    }
+    let loaded_2 = value;
+    machine.store::<[M::F; 4]>(
+        Global::States,
+        4 * (state.wrapping_add(POSITION) as usize),
+        [
+            [loaded_2[0], loaded_2[1], loaded_2[2]][0],
+            [loaded_2[0], loaded_2[1], loaded_2[2]][1],
+            [loaded_2[0], loaded_2[1], loaded_2[2]][2],
+            M::F::of(0.0),
+        ],
+    );
+    let loaded_3 = machine.load::<u32>(Global::Dispatch, 4);
+    if loaded_3 != 0u32 {
+        let _block = machine.block(line!(), 5);
+        if form == FORM_LINE {
+            let _block = machine.block(line!(), 7);
+            let result_5 = key_of(machine, channel, along.index);
+            let result_6 = key_after(machine, channel, base, along.index);
+            let line_2 = line_between(machine, result_5, result_6);
+            let result_7 = canonical3(
+                machine,
+                both(
+                    [line_2.slope[0], line_2.slope[1], line_2.slope[2]],
+                    [along.rate; 3],
+                    |x, y| x * y,
+                ),
+            );
+            velocity = result_7;
+        } else {
+            let _block = machine.block(line!(), 2);
+            if form != FORM_CONSTANT {
+                let _block = machine.block(line!(), 5);
+                let curve = value_and_slope(machine, channel, along, 4u32);
+                let result_8 = canonical3(
+                    machine,
+                    both(
+                        [curve.slope[0], curve.slope[1], curve.slope[2]],
+                        [along.rate; 3],
+                        |x, y| x * y,
+                    ),
+                );
+                velocity = result_8;
+            }
+        }
+        let loaded_4 = velocity;
+        machine.store::<[M::F; 4]>(
+            Global::States,
+            4 * (state.wrapping_add(VELOCITY) as usize),
+            loaded_4,
+        );
+        return;
+    } else {
+        return;
+    }
+}
+
 /// The product of a speed, below 2^23 in units of 2^-16, and a time, below 2^40.
 pub(crate) fn move_of<M: Machine>(machine: &M, speed: u32, time: [u32; 2]) -> CrowdMove {
     let _block = machine.block(line!(), 25);
@@ -4984,32 +5692,57 @@ pub(crate) fn move_of<M: Machine>(machine: &M, speed: u32, time: [u32; 2]) -> Cr
     }
 }
 
-pub(crate) fn near_distance<M: Machine>(machine: &M, first: i32, j: u32) -> M::F {
-    const OF_KERNELS: [u8; 194] = [
+/// At the last key it is the span that ends there.
+pub(crate) fn moving_span<M: Machine>(
+    machine: &M,
+    base: CrowdBase,
+    tick: u32,
+    index: u32,
+) -> MotionSpan<M::F> {
+    let _block = machine.block(line!(), 15);
+    let span = machine
+        .load::<CrowdSpan<M::F>>(Global::Spans, 4 * (base.first.wrapping_add(index) as usize));
+    let is_end = (span.scale == M::F::of(0.0)) & (span.start & TICKS == tick) & (index > 0u32);
+    let moving = index.wrapping_sub(if is_end { 1u32 } else { 0u32 });
+    let along = machine.load::<CrowdSpan<M::F>>(
+        Global::Spans,
+        4 * (base.first.wrapping_add(moving) as usize),
+    );
+    let result = parameter_in(machine, along, tick);
+    let loaded = machine.load::<M::F>(Global::Dispatch, 5);
+    MotionSpan {
+        index: moving,
+        parameter: result,
+        rate: along.scale * loaded,
+    }
+}
+
+pub(crate) fn near_distance<M: Machine>(machine: &M, at: i32) -> M::F {
+    const OF_KERNELS: [u8; 198] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
-        0 => near_distance_of_near_frame(machine, first, j),
-        _ => near_distance_of_near_time(machine, first, j),
+        0 => near_distance_of_near_frame(machine, at),
+        _ => near_distance_of_near_time(machine, at),
     }
 }
 
 /// A whole number of frames below 2^24, which is exact in f32.
-pub(crate) fn near_distance_of_near_frame<M: Machine>(machine: &M, first: i32, j: u32) -> M::F {
-    let _block = machine.block(line!(), 3);
-    M::F::of(first.wrapping_add(j as i32) as f32)
+pub(crate) fn near_distance_of_near_frame<M: Machine>(machine: &M, at: i32) -> M::F {
+    let _block = machine.block(line!(), 1);
+    M::F::of(at as f32)
 }
 
 /// How far a sample lies from its segment's middle, when samples are explicit times: all are listed.
-pub(crate) fn near_distance_of_near_time<M: Machine>(machine: &M, first: i32, j: u32) -> M::F {
+pub(crate) fn near_distance_of_near_time<M: Machine>(machine: &M, at: i32) -> M::F {
     let _block = machine.block(line!(), 1);
-    let result = distance_from_middle(machine, first, j);
+    let result = distance_from_middle(machine, at, 0u32);
     result
 }
 
@@ -5037,15 +5770,27 @@ pub(crate) fn over<M: Machine>(machine: &M, a: [M::F; 4], b: [M::F; 4], t: M::F)
     }
 }
 
+/// The lowest 20 bits as a signed number of units.
+pub(crate) fn packed_component<M: Machine>(machine: &M, word: u32) -> M::F {
+    let _block = machine.block(line!(), 5);
+    M::F::of((((word << 12u32) as i32) >> 12u32) as f32) * M::F::of(PACKED_STEP)
+}
+
+pub(crate) fn parameter_in<M: Machine>(machine: &M, span: CrowdSpan<M::F>, tick: u32) -> M::F {
+    let _block = machine.block(line!(), 5);
+    let result = distance_from_middle(machine, (tick as i32).wrapping_sub(span.whole), 0u32);
+    result * span.scale + span.offset
+}
+
 pub(crate) fn parts_1<M: Machine>(machine: &M, rotation: [M::F; 4]) -> [M::F; 3] {
-    const OF_KERNELS: [u8; 194] = [
+    const OF_KERNELS: [u8; 198] = [
         0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 2, 0, 0, 0,
         0, 0, 1, 0, 2, 0, 0, 0, 0, 0, 1, 0, 2, 0, 0, 0, 0, 0, 1, 0, 2, 0, 0, 0, 0, 0, 1, 0, 0, 0,
         0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 2, 0, 0, 0, 0, 0, 1, 0,
         2, 0, 0, 0, 0, 0, 1, 0, 2, 0, 0, 0, 0, 0, 1, 0, 2, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0,
-        0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0,
-        0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0,
+        0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => parts_1_of_euler(machine, rotation),
@@ -5075,14 +5820,14 @@ pub(crate) fn parts_1_of_euler_2<M: Machine>(machine: &M, rotation: [M::F; 4]) -
 }
 
 pub(crate) fn parts_2<M: Machine>(machine: &M, rotation: [M::F; 4]) -> [M::F; 9] {
-    const OF_KERNELS: [u8; 194] = [
+    const OF_KERNELS: [u8; 198] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1,
         0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0,
         0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => parts_2_of_matrix3x3(machine, rotation),
@@ -5143,14 +5888,14 @@ pub(crate) fn parts_2_of_matrix3x3_2<M: Machine>(machine: &M, rotation: [M::F; 4
 }
 
 pub(crate) fn parts_3<M: Machine>(machine: &M, rotation: [M::F; 4]) -> [[M::F; 4]; 3] {
-    const OF_KERNELS: [u8; 194] = [
+    const OF_KERNELS: [u8; 198] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0,
         0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => parts_3_of_matrix3x4(machine, rotation),
@@ -5299,14 +6044,14 @@ pub(crate) fn polynomial<M: Machine>(machine: &M, c: [[M::F; 4]; 11], s: M::F) -
 }
 
 pub(crate) fn pose<M: Machine>(machine: &M, sample: u32) {
-    const OF_KERNELS: [u8; 194] = [
+    const OF_KERNELS: [u8; 198] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 2, 3,
         4, 5, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => pose_of_add(machine, sample),
@@ -5528,14 +6273,14 @@ pub(crate) fn pose_of_world<M: Machine>(machine: &M, sample: u32) {
 }
 
 pub(crate) fn position_at<M: Machine>(machine: &M, index: u32) -> CrowdPosition<M::F> {
-    const OF_KERNELS: [u8; 194] = [
+    const OF_KERNELS: [u8; 198] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 2, 2, 2, 2,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 2, 2, 2, 2,
     ];
     match OF_KERNELS[machine.code()] {
         0 => position_at_of_readers(machine, index),
@@ -5571,6 +6316,24 @@ pub(crate) fn position_at_of_readers_2<M: Machine>(machine: &M, index: u32) -> C
     CrowdPosition {
         span: pair[0],
         parameter: M::F::of_bits(pair[1]),
+    }
+}
+
+/// The position of a tick in a time base.
+pub(crate) fn position_in<M: Machine>(
+    machine: &M,
+    base: CrowdBase,
+    tick: u32,
+) -> CrowdPosition<M::F> {
+    let _block = machine.block(line!(), 8);
+    let index = span_at(machine, base, tick);
+    let span = machine
+        .load::<CrowdSpan<M::F>>(Global::Spans, 4 * (base.first.wrapping_add(index) as usize));
+    let is_key = span.start == tick | ON_KEY;
+    let result = parameter_in(machine, span, tick);
+    CrowdPosition {
+        span: index | (if is_key { ON_KEY } else { 0u32 }),
+        parameter: result,
     }
 }
 
@@ -5611,12 +6374,145 @@ pub(crate) fn remainder<M: Machine>(machine: &M, x: u32, q: u32) -> u32 {
     x.wrapping_sub(quotient(x, q).wrapping_mul(q))
 }
 
+/// x - (r + h)² for |h| of half a unit of the last place of r: its sign is exact.
+pub(crate) fn rest_of_square<M: Machine>(machine: &M, x: M::F, r: M::F, h: M::F) -> M::F {
+    let _block = machine.block(line!(), 16);
+    let high = M::F::of_bits(r.bits() & 0xfffff000u32);
+    let low = r - high;
+    let rest = ((x - high * high) - (M::F::of(2.0) * high) * low) - (M::F::of(2.0) * r) * h;
+    (rest - low * low) - h * h
+}
+
 pub(crate) fn root<M: Machine>(machine: &M, x: M::F) -> M::F {
     let _block = machine.block(line!(), 8);
     let result = reciprocal_root(machine, x);
     let near = x * result;
     let result_2 = reciprocal_root(machine, x);
     near + (x - near * near) * (M::F::of(0.5) * result_2)
+}
+
+/// Stores the rotation and the angular velocity about the parent's axes.
+pub(crate) fn rotate<M: Machine>(
+    machine: &M,
+    channel: CrowdChannel,
+    clip: CrowdClip,
+    tick: u32,
+    state: u32,
+) {
+    let mut rotation: [M::F; 4] = Default::default();
+    let mut curve: ValueAndSlope<M::F> = Default::default();
+    let mut arc: ArcSegment<M::F> = Default::default();
+    let mut velocity: [M::F; 4] = [M::F::of(0.0); 4];
+    let _block = machine.block(line!(), 22);
+    let base = machine.load::<CrowdBase>(
+        Global::TimeBases,
+        3 * (clip
+            .first_base
+            .wrapping_add(channel.form_and_base & 0xffffffu32) as usize),
+    );
+    let form = channel.form_and_base >> 24u32;
+    let position = position_in(machine, base, tick);
+    let span = position.span & TICKS;
+    let is_key = position.span & ON_KEY != 0u32;
+    let along = moving_span(machine, base, tick, span);
+    let loaded = machine.load::<u32>(Global::Dispatch, 4);
+    let moves = loaded != 0u32;
+    if (form == FORM_KEYS) | (form == FORM_PACKED) {
+        let _block = machine.block(line!(), 9);
+        if moves | !is_key {
+            let _block = machine.block(line!(), 4);
+            let result = key_of(machine, channel, along.index);
+            let result_2 = key_after(machine, channel, base, along.index);
+            let result_3 = arc_between(machine, result, result_2);
+            arc = result_3;
+        }
+        if is_key | (along.index != span) {
+            let _block = machine.block(line!(), 2);
+            let result_4 = key_of(machine, channel, span);
+            rotation = result_4;
+        } else {
+            let _block = machine.block(line!(), 4);
+            let loaded_2 = arc;
+            let result_5 = evaluate_arc_segment(machine, loaded_2, position.parameter);
+            let result_6 = canonical(machine, result_5);
+            rotation = result_6;
+        }
+        let loaded_3 = arc.middle;
+        let loaded_4 = arc.tangent;
+        curve = ValueAndSlope {
+            value: loaded_3,
+            slope: loaded_4,
+        };
+    } else {
+        let _block = machine.block(line!(), 5);
+        let result_7 = sampled(machine, channel, position);
+        rotation = result_7;
+        if moves & (form == FORM_ARC) {
+            let _block = machine.block(line!(), 7);
+            let first = channel
+                .first
+                .wrapping_add(along.index.wrapping_mul(channel.count).wrapping_mul(2u32));
+            let result_8 = cell_at(machine, first);
+            let result_9 = cell_at(machine, first.wrapping_add(channel.count));
+            curve = ValueAndSlope {
+                value: result_8,
+                slope: result_9,
+            };
+        } else {
+            let _block = machine.block(line!(), 3);
+            if moves & (form != FORM_CONSTANT) {
+                let _block = machine.block(line!(), 2);
+                let result_10 = value_and_slope(machine, channel, along, 11u32);
+                curve = result_10;
+            }
+        }
+    }
+    let loaded_5 = rotation;
+    machine.store::<[M::F; 4]>(
+        Global::States,
+        4 * (state.wrapping_add(LOCAL_ROTATION) as usize),
+        loaded_5,
+    );
+    let loaded_6 = rotation;
+    machine.store::<[M::F; 4]>(
+        Global::States,
+        4 * (state.wrapping_add(WORLD_ROTATION) as usize),
+        loaded_6,
+    );
+    if moves {
+        let _block = machine.block(line!(), 5);
+        if form != FORM_CONSTANT {
+            let _block = machine.block(line!(), 11);
+            let loaded_7 = curve.value;
+            let loaded_8 = curve.value[3];
+            let inverse = [
+                [loaded_7[0], loaded_7[1], loaded_7[2]].map(|x| -x)[0],
+                [loaded_7[0], loaded_7[1], loaded_7[2]].map(|x| -x)[1],
+                [loaded_7[0], loaded_7[1], loaded_7[2]].map(|x| -x)[2],
+                loaded_8,
+            ];
+            let loaded_9 = curve.slope;
+            let result_11 = product(machine, loaded_9, inverse);
+            let result_12 = canonical3(
+                machine,
+                both(
+                    [result_11[0], result_11[1], result_11[2]],
+                    [M::F::of(2.0) * along.rate; 3],
+                    |x, y| x * y,
+                ),
+            );
+            velocity = result_12;
+        }
+        let loaded_10 = velocity;
+        machine.store::<[M::F; 4]>(
+            Global::States,
+            4 * (state.wrapping_add(ANGULAR_VELOCITY) as usize),
+            loaded_10,
+        );
+        return;
+    } else {
+        return;
+    }
 }
 
 /// q v q*, for a unit quaternion.
@@ -5892,14 +6788,14 @@ pub(crate) fn row_product<M: Machine>(
 }
 
 pub(crate) fn sample_at_key_sample<M: Machine>(machine: &M, index: u32) -> KeySample<M::F> {
-    const OF_KERNELS: [u8; 194] = [
+    const OF_KERNELS: [u8; 198] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => sample_at_key_sample_of_readers(machine, index),
@@ -5934,14 +6830,14 @@ pub(crate) fn sample_at_key_sample_of_readers_2<M: Machine>(
 }
 
 pub(crate) fn sample_at_listed_sample<M: Machine>(machine: &M, index: u32) -> ListedSample<M::F> {
-    const OF_KERNELS: [u8; 194] = [
+    const OF_KERNELS: [u8; 198] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1,
-        1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => sample_at_listed_sample_of_readers(machine, index),
@@ -6121,14 +7017,14 @@ pub(crate) fn sampled<M: Machine>(
 }
 
 pub(crate) fn segment_at_arc_segment<M: Machine>(machine: &M, index: u32) -> ArcSegment<M::F> {
-    const OF_KERNELS: [u8; 194] = [
+    const OF_KERNELS: [u8; 198] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
-        1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1,
+        1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => segment_at_arc_segment_of_readers(machine, index),
@@ -6164,14 +7060,14 @@ pub(crate) fn segment_at_polynomial_segment<M: Machine>(
     machine: &M,
     index: u32,
 ) -> PolynomialSegment<M::F> {
-    const OF_KERNELS: [u8; 194] = [
+    const OF_KERNELS: [u8; 198] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
-        1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
+        1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => segment_at_polynomial_segment_of_readers(machine, index),
@@ -6726,14 +7622,14 @@ pub(crate) fn step_vector<M: Machine>(machine: &M, a: [M::F; 4], chord: [M::F; 4
 }
 
 pub(crate) fn store<M: Machine>(machine: &M, index: u32, rotation: [M::F; 4]) {
-    const OF_KERNELS: [u8; 194] = [
+    const OF_KERNELS: [u8; 198] = [
         0, 0, 1, 2, 3, 4, 5, 6, 1, 0, 1, 2, 3, 4, 5, 6, 1, 0, 1, 2, 3, 4, 5, 6, 1, 0, 1, 2, 3, 4,
         5, 6, 1, 0, 1, 2, 3, 4, 5, 6, 1, 0, 1, 2, 3, 4, 5, 6, 1, 0, 1, 2, 3, 4, 5, 6, 1, 0, 1, 2,
         3, 4, 5, 6, 1, 0, 1, 2, 3, 4, 5, 6, 1, 0, 1, 2, 3, 4, 5, 6, 1, 0, 1, 2, 3, 4, 5, 6, 1, 0,
         1, 2, 3, 4, 5, 6, 1, 0, 1, 2, 3, 4, 5, 6, 1, 0, 1, 2, 3, 4, 5, 6, 1, 3, 3, 3, 0, 0, 0, 0,
-        0, 0, 3, 3, 3, 3, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 3, 0, 0, 1, 2, 7, 4, 5, 6, 1, 0, 1, 2,
-        7, 4, 5, 6, 1, 0, 1, 2, 7, 4, 5, 6, 1, 0, 1, 2, 7, 4, 5, 6, 1, 0, 1, 2, 7, 4, 5, 6, 1, 0,
-        1, 2, 7, 4, 5, 6, 1, 7, 7, 7, 7, 7, 7, 7,
+        0, 0, 3, 3, 3, 3, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 3, 0, 0, 0, 0, 0, 0, 1, 2, 7, 4, 5, 6,
+        1, 0, 1, 2, 7, 4, 5, 6, 1, 0, 1, 2, 7, 4, 5, 6, 1, 0, 1, 2, 7, 4, 5, 6, 1, 0, 1, 2, 7, 4,
+        5, 6, 1, 0, 1, 2, 7, 4, 5, 6, 1, 7, 7, 7, 7, 7, 7, 7,
     ];
     match OF_KERNELS[machine.code()] {
         0 => store_of_axis_angle(machine, index, rotation),
@@ -6868,21 +7764,20 @@ pub(crate) fn store_with_care<M: Machine>(
     item: SpreadRun<M::F>,
     location: [u32; 3],
     first_j: u32,
-    lanes: u32,
     repetition: u32,
 ) {
-    const OF_KERNELS: [u8; 194] = [
+    const OF_KERNELS: [u8; 198] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 1, 0, 1, 1, 0, 0, 1, 0, 1, 0, 1, 1, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
-        0 => store_with_care_of_alone(machine, item, location, first_j, lanes, repetition),
-        _ => store_with_care_of_alone_2(machine, item, location, first_j, lanes, repetition),
+        0 => store_with_care_of_alone(machine, item, location, first_j, repetition),
+        _ => store_with_care_of_alone_2(machine, item, location, first_j, repetition),
     }
 }
 
@@ -6892,51 +7787,64 @@ pub(crate) fn store_with_care_of_alone<M: Machine>(
     item: SpreadRun<M::F>,
     location: [u32; 3],
     first_j: u32,
-    lanes: u32,
     repetition: u32,
 ) {
     let mut j: u32 = Default::default();
-    let _block = machine.block(line!(), 12);
+    let _block = machine.block(line!(), 14);
     let count = sample_count(machine, item);
     let first = location[1];
+    let stride = machine.load::<u32>(Global::Dispatch, 9);
+    let step = machine.load::<u32>(Global::Dispatch, 7);
     j = first_j;
     if item.count & IS_CONSTANT != 0u32 {
         let _block = machine.block(line!(), 7);
         let constant = constant_of_run(machine, item.source, repetition);
         let loaded = j;
         if loaded < count {
-            let _block = machine.block(line!(), 3);
+            let _block = machine.block(line!(), 4);
             let loaded_2 = j;
-            store(machine, first.wrapping_add(loaded_2), constant);
+            store(
+                machine,
+                first.wrapping_add(loaded_2.wrapping_mul(stride)),
+                constant,
+            );
         }
         let loaded_3 = j;
-        j = loaded_3.wrapping_add(lanes);
+        j = loaded_3.wrapping_add(step);
         loop {
-            let _block = machine.block(line!(), 9);
+            let _block = machine.block(line!(), 10);
             let loaded_4 = j;
             if !(loaded_4 < count) {
                 break;
             }
             let loaded_5 = j;
-            store(machine, first.wrapping_add(loaded_5), constant);
+            store(
+                machine,
+                first.wrapping_add(loaded_5.wrapping_mul(stride)),
+                constant,
+            );
             let loaded_6 = j;
-            j = loaded_6.wrapping_add(lanes);
+            j = loaded_6.wrapping_add(step);
         }
         return;
     }
     let segment = segment_at_arc_segment(machine, location[0]);
     let loaded_7 = j;
     if loaded_7 < count {
-        let _block = machine.block(line!(), 5);
+        let _block = machine.block(line!(), 6);
         let loaded_8 = j;
         let loaded_9 = j;
         let result = sample_of_arc_segment(machine, item, segment, loaded_9, repetition);
-        store(machine, first.wrapping_add(loaded_8), result);
+        store(
+            machine,
+            first.wrapping_add(loaded_8.wrapping_mul(stride)),
+            result,
+        );
     }
     let loaded_10 = j;
-    j = loaded_10.wrapping_add(lanes);
+    j = loaded_10.wrapping_add(step);
     loop {
-        let _block = machine.block(line!(), 11);
+        let _block = machine.block(line!(), 12);
         let loaded_11 = j;
         if !(loaded_11 < count) {
             break;
@@ -6944,9 +7852,13 @@ pub(crate) fn store_with_care_of_alone<M: Machine>(
         let loaded_12 = j;
         let loaded_13 = j;
         let result_2 = sample_of_arc_segment(machine, item, segment, loaded_13, repetition);
-        store(machine, first.wrapping_add(loaded_12), result_2);
+        store(
+            machine,
+            first.wrapping_add(loaded_12.wrapping_mul(stride)),
+            result_2,
+        );
         let loaded_14 = j;
-        j = loaded_14.wrapping_add(lanes);
+        j = loaded_14.wrapping_add(step);
     }
 }
 
@@ -6956,51 +7868,64 @@ pub(crate) fn store_with_care_of_alone_2<M: Machine>(
     item: SpreadRun<M::F>,
     location: [u32; 3],
     first_j: u32,
-    lanes: u32,
     repetition: u32,
 ) {
     let mut j: u32 = Default::default();
-    let _block = machine.block(line!(), 12);
+    let _block = machine.block(line!(), 14);
     let count = sample_count(machine, item);
     let first = location[1];
+    let stride = machine.load::<u32>(Global::Dispatch, 9);
+    let step = machine.load::<u32>(Global::Dispatch, 7);
     j = first_j;
     if item.count & IS_CONSTANT != 0u32 {
         let _block = machine.block(line!(), 7);
         let constant = constant_of_run(machine, item.source, repetition);
         let loaded = j;
         if loaded < count {
-            let _block = machine.block(line!(), 3);
+            let _block = machine.block(line!(), 4);
             let loaded_2 = j;
-            store(machine, first.wrapping_add(loaded_2), constant);
+            store(
+                machine,
+                first.wrapping_add(loaded_2.wrapping_mul(stride)),
+                constant,
+            );
         }
         let loaded_3 = j;
-        j = loaded_3.wrapping_add(lanes);
+        j = loaded_3.wrapping_add(step);
         loop {
-            let _block = machine.block(line!(), 9);
+            let _block = machine.block(line!(), 10);
             let loaded_4 = j;
             if !(loaded_4 < count) {
                 break;
             }
             let loaded_5 = j;
-            store(machine, first.wrapping_add(loaded_5), constant);
+            store(
+                machine,
+                first.wrapping_add(loaded_5.wrapping_mul(stride)),
+                constant,
+            );
             let loaded_6 = j;
-            j = loaded_6.wrapping_add(lanes);
+            j = loaded_6.wrapping_add(step);
         }
         return;
     }
     let segment = segment_at_polynomial_segment(machine, location[0]);
     let loaded_7 = j;
     if loaded_7 < count {
-        let _block = machine.block(line!(), 5);
+        let _block = machine.block(line!(), 6);
         let loaded_8 = j;
         let loaded_9 = j;
         let result = sample_of_polynomial_segment(machine, item, segment, loaded_9, repetition);
-        store(machine, first.wrapping_add(loaded_8), result);
+        store(
+            machine,
+            first.wrapping_add(loaded_8.wrapping_mul(stride)),
+            result,
+        );
     }
     let loaded_10 = j;
-    j = loaded_10.wrapping_add(lanes);
+    j = loaded_10.wrapping_add(step);
     loop {
-        let _block = machine.block(line!(), 11);
+        let _block = machine.block(line!(), 12);
         let loaded_11 = j;
         if !(loaded_11 < count) {
             break;
@@ -7008,21 +7933,25 @@ pub(crate) fn store_with_care_of_alone_2<M: Machine>(
         let loaded_12 = j;
         let loaded_13 = j;
         let result_2 = sample_of_polynomial_segment(machine, item, segment, loaded_13, repetition);
-        store(machine, first.wrapping_add(loaded_12), result_2);
+        store(
+            machine,
+            first.wrapping_add(loaded_12.wrapping_mul(stride)),
+            result_2,
+        );
         let loaded_14 = j;
-        j = loaded_14.wrapping_add(lanes);
+        j = loaded_14.wrapping_add(step);
     }
 }
 
 pub(crate) fn tick_of<M: Machine>(machine: &M, entry: CrowdEntry, period: u32) -> u32 {
-    const OF_KERNELS: [u8; 194] = [
+    const OF_KERNELS: [u8; 198] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => tick_of_of_ticks(machine, entry, period),
@@ -7321,6 +8250,114 @@ pub(crate) fn transform_row<M: Machine>(
     result
 }
 
+pub(crate) fn unpacked<M: Machine>(machine: &M, words: [u32; 2]) -> [M::F; 4] {
+    let _block = machine.block(line!(), 30);
+    let a = packed_component(machine, words[0]);
+    let b = packed_component(machine, (words[0] >> 20u32) | (words[1] << 12u32));
+    let c = packed_component(machine, words[1] >> 8u32);
+    let square = (a * a + b * b) + c * c;
+    let rest = M::F::of(1.0) - square;
+    let d = exact_root(
+        machine,
+        if rest < M::F::of(0.0) {
+            M::F::of(0.0)
+        } else {
+            rest
+        },
+    );
+    let largest = (words[1] >> 28u32) & 3u32;
+    let value = if largest >= 2u32 {
+        if largest == 3u32 {
+            [a, b, c, d]
+        } else {
+            [b, c, d, a]
+        }
+    } else {
+        if largest == 1u32 {
+            [c, d, a, b]
+        } else {
+            [d, a, b, c]
+        }
+    };
+    let is_negative = (words[1] >> 30u32) & 1u32 == 1u32;
+    let result = canonical(
+        machine,
+        if is_negative {
+            value.map(|x| -x)
+        } else {
+            value
+        },
+    );
+    result
+}
+
+/// The value of a curve of so many coefficients, or its derivative by its parameter.
+pub(crate) fn value_and_slope<M: Machine>(
+    machine: &M,
+    channel: CrowdChannel,
+    along: MotionSpan<M::F>,
+    coefficients: u32,
+) -> ValueAndSlope<M::F> {
+    let mut cell: u32 = Default::default();
+    let mut slope: [M::F; 4] = Default::default();
+    let mut value: [M::F; 4] = Default::default();
+    let mut power: u32 = Default::default();
+    let _block = machine.block(line!(), 23);
+    let first = channel.first.wrapping_add(
+        along
+            .index
+            .wrapping_mul(channel.count)
+            .wrapping_mul(coefficients),
+    );
+    cell = first.wrapping_add(coefficients.wrapping_sub(1u32).wrapping_mul(channel.count));
+    let loaded = cell;
+    let result = cell_at(machine, loaded);
+    slope = result;
+    let loaded_2 = cell;
+    cell = loaded_2.wrapping_sub(channel.count);
+    let loaded_3 = slope;
+    let loaded_4 = cell;
+    let result_2 = cell_at(machine, loaded_4);
+    value = both(
+        both(loaded_3, [along.parameter; 4], |x, y| x * y),
+        result_2,
+        |x, y| x + y,
+    );
+    power = coefficients.wrapping_sub(2u32);
+    loop {
+        let _block = machine.block(line!(), 20);
+        let loaded_5 = power;
+        if !(loaded_5 != 0u32) {
+            break;
+        }
+        let loaded_6 = slope;
+        let loaded_7 = value;
+        slope = both(
+            both(loaded_6, [along.parameter; 4], |x, y| x * y),
+            loaded_7,
+            |x, y| x + y,
+        );
+        let loaded_8 = cell;
+        cell = loaded_8.wrapping_sub(channel.count);
+        let loaded_9 = value;
+        let loaded_10 = cell;
+        let result_3 = cell_at(machine, loaded_10);
+        value = both(
+            both(loaded_9, [along.parameter; 4], |x, y| x * y),
+            result_3,
+            |x, y| x + y,
+        );
+        let loaded_11 = power;
+        power = loaded_11.wrapping_sub(1u32);
+    }
+    let loaded_12 = value;
+    let loaded_13 = slope;
+    ValueAndSlope {
+        value: loaded_12,
+        slope: loaded_13,
+    }
+}
+
 /// Makes the matrix of a joint one in the model, where its parent's is one.
 pub(crate) fn walk<M: Machine>(machine: &M, instance: u32, link: CrowdLink) {
     let _block = machine.block(line!(), 26);
@@ -7357,14 +8394,14 @@ pub(crate) fn walk<M: Machine>(machine: &M, instance: u32, link: CrowdLink) {
 }
 
 pub(crate) fn weights_at<M: Machine>(machine: &M, index: u32) -> TangentWeights<M::F> {
-    const OF_KERNELS: [u8; 194] = [
+    const OF_KERNELS: [u8; 198] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => weights_at_of_readers(machine, index),

@@ -74,11 +74,9 @@ pub(crate) fn root<N: Number>(x: N) -> N {
     near + (x - near * near) * (N::all(0.5) * reciprocal_root(x))
 }
 
-/// The angle of the point (x, y), from -pi to pi; 0 for (0, 0).
+/// The angle of the point (along, up), neither of which is negative, from 0 to pi/2; 0 for (0, 0).
 #[inline(always)]
-pub(crate) fn arc_tangent(y: f32, x: f32) -> f32 {
-    let up = magnitude(y);
-    let along = magnitude(x);
+pub(crate) fn acute_arc_tangent(up: f32, along: f32) -> f32 {
     let steep = up > along;
     let large = if steep { up } else { along };
     let small = if steep { along } else { up };
@@ -90,11 +88,17 @@ pub(crate) fn arc_tangent(y: f32, x: f32) -> f32 {
     let high = (((ARC_8 * z + ARC_7) * z + ARC_6) * z + ARC_5) * z + ARC_4;
     let tail = (((high * z + ARC_3) * z + ARC_2) * z + ARC_1) * z + ARC_0;
     let flat = tail * (z * t) + t;
-    let acute = if steep {
+    if steep {
         HALF_PI - flat + HALF_PI_LOW
     } else {
         flat
-    };
+    }
+}
+
+/// The angle of the point (x, y), from -pi to pi; 0 for (0, 0).
+#[inline(always)]
+pub(crate) fn arc_tangent(y: f32, x: f32) -> f32 {
+    let acute = acute_arc_tangent(magnitude(y), magnitude(x));
     let obtuse = if x < 0.0 { PI - acute + PI_LOW } else { acute };
     if y < 0.0 { -obtuse } else { obtuse }
 }
@@ -488,7 +492,7 @@ pub(crate) fn euler(rotation: [f32; 4], detail: u32) -> [f32; 3] {
     } else {
         outer
     };
-    let whole = 2.0 * arc_tangent(sine, cosine);
+    let whole = 2.0 * acute_arc_tangent(sine, cosine);
     let second = if symmetric {
         whole
     } else {
@@ -496,7 +500,7 @@ pub(crate) fn euler(rotation: [f32; 4], detail: u32) -> [f32; 3] {
     };
     [
         wrapped(first) * DEGREES,
-        wrapped(second) * DEGREES,
+        second * DEGREES,
         wrapped(inner) * DEGREES,
     ]
 }

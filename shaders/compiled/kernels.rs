@@ -1,5 +1,6 @@
 // Written by `cargo run -p tumble-shaders` from the shaders: change those.
 
+pub(crate) const ANGULAR_VELOCITY: u32 = 4;
 pub(crate) const ARC_0: f32 = -0.3333333;
 pub(crate) const ARC_1: f32 = 0.1999974;
 pub(crate) const ARC_2: f32 = -0.14278568;
@@ -63,6 +64,9 @@ pub(crate) const FLUSHED_BITS: u32 = 645922816;
 pub(crate) const FORM_ARC: u32 = 1;
 pub(crate) const FORM_CONSTANT: u32 = 0;
 pub(crate) const FORM_CUBIC: u32 = 2;
+pub(crate) const FORM_KEYS: u32 = 16;
+pub(crate) const FORM_LINE: u32 = 18;
+pub(crate) const FORM_PACKED: u32 = 17;
 pub(crate) const FORM_POLYNOMIAL: u32 = 3;
 pub(crate) const FROM_KEYS_WORKGROUP: u32 = 64;
 pub(crate) const GIMBAL: f32 = 2.5e-7;
@@ -82,6 +86,7 @@ pub(crate) const LEAST_NORMAL: u32 = 947912704;
 pub(crate) const LEAST_SQUARED_SUM: f32 = 9.094947e-13;
 pub(crate) const LINE: u32 = 8;
 pub(crate) const LINE_VECTORS: u32 = 8;
+pub(crate) const LOCAL_ROTATION: u32 = 0;
 pub(crate) const LOG_1: f32 = 0.16666667;
 pub(crate) const LOG_2: f32 = 0.075;
 pub(crate) const LOG_3: f32 = 0.04464286;
@@ -95,13 +100,16 @@ pub(crate) const MAX_WALKED: u32 = 128;
 pub(crate) const MAX_WHOLE_JOINTS: u32 = 128;
 pub(crate) const MAX_WHOLE_POSITIONS: u32 = 128;
 pub(crate) const MAY_BE_TINY: u32 = 1073741824;
+pub(crate) const MOTION_WORKGROUP: u32 = 64;
 pub(crate) const NEEDS_CARE: u32 = 1073741824;
 pub(crate) const NEGATIVE: u32 = 128;
 pub(crate) const NO_KEY: u32 = 4294967295;
 pub(crate) const ON_KEY: u32 = 2147483648;
+pub(crate) const PACKED_STEP: f32 = 1.3487017e-6;
 pub(crate) const PI: f32 = 3.1415927;
 pub(crate) const PI_LOW: f32 = -8.742278e-8;
 pub(crate) const POSE_WORKGROUP: u32 = 64;
+pub(crate) const POSITION: u32 = 2;
 pub(crate) const PREPARE_WORKGROUP: u32 = 64;
 pub(crate) const QUARTER_COSINE_2: f32 = -0.5;
 pub(crate) const QUARTER_COSINE_4: f32 = 0.041666646;
@@ -149,14 +157,17 @@ pub(crate) const SPEED_MAGNITUDE: u32 = 8388607;
 pub(crate) const SPREAD_WORKGROUP: u32 = 128;
 pub(crate) const START_BIAS: u32 = 131072;
 pub(crate) const START_NEGATED: u32 = 1073741824;
+pub(crate) const STATE_VECTORS: u32 = 5;
 pub(crate) const SYMMETRIC: u32 = 64;
 pub(crate) const THIRD: f32 = 0.33333334;
 pub(crate) const TICKS: u32 = 2147483647;
 pub(crate) const TINY_BITS: u32 = 528482304;
 pub(crate) const TRANSLATION: u32 = 1;
 pub(crate) const TWO_THIRDS: f32 = 0.6666667;
+pub(crate) const VELOCITY: u32 = 3;
 pub(crate) const WEIGHT_UNIT: f32 = 3.0517578e-5;
 pub(crate) const WORKGROUP: u32 = 64;
+pub(crate) const WORLD_ROTATION: u32 = 1;
 pub(crate) const WRAP_HOLD: u32 = 0;
 pub(crate) const WRAP_LOOP: u32 = 1;
 pub(crate) const WRAP_MIRROR: u32 = 2;
@@ -578,6 +589,49 @@ const _: () = {
 };
 #[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
+pub(crate) struct MotionDispatch {
+/// The number of invocations with work.
+    pub(crate) count: u32,
+/// The first sample of the window.
+    pub(crate) first_sample: u32,
+/// Joints of the skeleton.
+    pub(crate) joints: u32,
+/// Joints that have a parent.
+    pub(crate) links: u32,
+/// 1 where velocities are derivatives of the curves, else 0.
+    pub(crate) moves: u32,
+/// Ticks in a second.
+    pub(crate) ticks_per_second: f32,
+/// The vector of each joint's state that is stored.
+    pub(crate) vector: u32,
+/// How many numbers of it are stored.
+    pub(crate) numbers: u32,
+}
+const _: () = {
+    assert!(size_of::<MotionDispatch>() == 32);
+    assert!(std::mem::offset_of!(MotionDispatch, count) == 0);
+    assert!(std::mem::offset_of!(MotionDispatch, first_sample) == 4);
+    assert!(std::mem::offset_of!(MotionDispatch, joints) == 8);
+    assert!(std::mem::offset_of!(MotionDispatch, links) == 12);
+    assert!(std::mem::offset_of!(MotionDispatch, moves) == 16);
+    assert!(std::mem::offset_of!(MotionDispatch, ticks_per_second) == 20);
+    assert!(std::mem::offset_of!(MotionDispatch, vector) == 24);
+    assert!(std::mem::offset_of!(MotionDispatch, numbers) == 28);
+};
+/// A clip and the tick at which it is sampled.
+#[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub(crate) struct MotionSample {
+    pub(crate) clip: u32,
+    pub(crate) tick: u32,
+}
+const _: () = {
+    assert!(size_of::<MotionSample>() == 8);
+    assert!(std::mem::offset_of!(MotionSample, clip) == 0);
+    assert!(std::mem::offset_of!(MotionSample, tick) == 4);
+};
+#[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
 pub(crate) struct PolynomialSegment {
 /// The coefficients of 1, s, s², … s¹⁰.
     pub(crate) coefficients: [[f32; 4]; 11],
@@ -679,12 +733,26 @@ pub(crate) struct Spread {
     pub(crate) item_count: u32,
 /// The number that is added to their `output`.
     pub(crate) first_output: u32,
-/// The invocations of a run, as a power of two.
+/// The lanes of a run, as a power of two.
     pub(crate) lanes_log2: u32,
+/// The lanes of a run less one, if they have neighbouring samples; 0 if they have neighbouring tracks.
+    pub(crate) sample_mask: u32,
+/// The lanes of a run less one, if they have neighbouring tracks; else 0.
+    pub(crate) track_mask: u32,
+/// From a sample of a lane to its next one.
+    pub(crate) step: u32,
+/// The same as a power of two.
+    pub(crate) step_log2: u32,
+/// The distance in the result between neighbouring samples of a track, in values.
+    pub(crate) stride: u32,
 /// The invocations that store one line of memory, less one.
     pub(crate) line_mask: u32,
-/// How many segments the runs of the next repetition are further on, where tracks with the same times share their
-/// runs. A repetition is a layer of workgroups.
+/// How often the runs are evaluated, where tracks with the same times share them. A layer of workgroups, along z,
+/// evaluates one repetition, or one for each lane of a run.
+    pub(crate) repetitions: u32,
+/// The repetitions of a layer of workgroups.
+    pub(crate) layer_repetitions: u32,
+/// How many segments the runs of the next repetition are further on.
     pub(crate) segments: u32,
 /// How many constants they are further on.
     pub(crate) constants: u32,
@@ -692,19 +760,25 @@ pub(crate) struct Spread {
     pub(crate) outputs: u32,
 }
 const _: () = {
-    assert!(size_of::<Spread>() == 36);
+    assert!(size_of::<Spread>() == 64);
     assert!(std::mem::offset_of!(Spread, detail) == 0);
     assert!(std::mem::offset_of!(Spread, first_item) == 4);
     assert!(std::mem::offset_of!(Spread, item_count) == 8);
     assert!(std::mem::offset_of!(Spread, first_output) == 12);
     assert!(std::mem::offset_of!(Spread, lanes_log2) == 16);
-    assert!(std::mem::offset_of!(Spread, line_mask) == 20);
-    assert!(std::mem::offset_of!(Spread, segments) == 24);
-    assert!(std::mem::offset_of!(Spread, constants) == 28);
-    assert!(std::mem::offset_of!(Spread, outputs) == 32);
+    assert!(std::mem::offset_of!(Spread, sample_mask) == 20);
+    assert!(std::mem::offset_of!(Spread, track_mask) == 24);
+    assert!(std::mem::offset_of!(Spread, step) == 28);
+    assert!(std::mem::offset_of!(Spread, step_log2) == 32);
+    assert!(std::mem::offset_of!(Spread, stride) == 36);
+    assert!(std::mem::offset_of!(Spread, line_mask) == 40);
+    assert!(std::mem::offset_of!(Spread, repetitions) == 44);
+    assert!(std::mem::offset_of!(Spread, layer_repetitions) == 48);
+    assert!(std::mem::offset_of!(Spread, segments) == 52);
+    assert!(std::mem::offset_of!(Spread, constants) == 56);
+    assert!(std::mem::offset_of!(Spread, outputs) == 60);
 };
-/// Consecutive samples of one track that lie in one segment, or hold one constant. Its invocations take
-/// neighbouring samples in turn.
+/// Consecutive samples of one track that lie in one segment, or hold one constant.
 #[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub(crate) struct SpreadRun {
@@ -897,6 +971,10 @@ pub(crate) enum Kernel {
     CrowdWholeMatrices,
     CrowdPlainWholeMatrices,
     CrowdSubgroupRotations,
+    MotionJoints,
+    MotionWalk,
+    MotionDifferences,
+    MotionStore,
     PrepareArcs,
 }
 /// How the work over segments is listed.
@@ -1041,132 +1119,132 @@ impl Kernel {
         }
     }
 }
-pub(crate) static KERNELS: [KernelCode; 139] = [
-    KernelCode { kernel: Kernel::SelfTest, storage: ("self_test", 1920), texels: None, converting: None, bindings: &[Read, Write], segments: None, subgroups: false },
-    KernelCode { kernel: Kernel::ArcFramesAxisAngle, storage: ("arc_frames_axis_angle", 2937), texels: Some(("arc_frames_axis_angle_texels", 3063)), converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::Frames, Store::AxisAngle)), subgroups: false },
-    KernelCode { kernel: Kernel::ArcFramesEuler, storage: ("arc_frames_euler", 3598), texels: Some(("arc_frames_euler_texels", 3716)), converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::Frames, Store::Euler)), subgroups: false },
+pub(crate) static KERNELS: [KernelCode; 143] = [
+    KernelCode { kernel: Kernel::SelfTest, storage: ("self_test", 1946), texels: None, converting: None, bindings: &[Read, Write], segments: None, subgroups: false },
+    KernelCode { kernel: Kernel::ArcFramesAxisAngle, storage: ("arc_frames_axis_angle", 2963), texels: Some(("arc_frames_axis_angle_texels", 3089)), converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::Frames, Store::AxisAngle)), subgroups: false },
+    KernelCode { kernel: Kernel::ArcFramesEuler, storage: ("arc_frames_euler", 3619), texels: Some(("arc_frames_euler_texels", 3737)), converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::Frames, Store::Euler)), subgroups: false },
     KernelCode { kernel: Kernel::ArcFramesF16, storage: ("arc_frames_f16", 2176), texels: Some(("arc_frames_f16_texels", 2294)), converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::Frames, Store::F16)), subgroups: false },
     KernelCode { kernel: Kernel::ArcFramesF32, storage: ("arc_frames_f32", 1920), texels: Some(("arc_frames_f32_texels", 2151)), converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::Frames, Store::F32)), subgroups: false },
     KernelCode { kernel: Kernel::ArcFramesMatrix3x3, storage: ("arc_frames_matrix3x3", 2604), texels: Some(("arc_frames_matrix3x3_texels", 2722)), converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::Frames, Store::Matrix3x3)), subgroups: false },
     KernelCode { kernel: Kernel::ArcFramesMatrix3x4, storage: ("arc_frames_matrix3x4", 2638), texels: Some(("arc_frames_matrix3x4_texels", 2760)), converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::Frames, Store::Matrix3x4)), subgroups: false },
     KernelCode { kernel: Kernel::ArcFramesSnorm16, storage: ("arc_frames_snorm16", 2057), texels: Some(("arc_frames_snorm16_texels", 2175)), converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::Frames, Store::Snorm16)), subgroups: false },
     KernelCode { kernel: Kernel::ArcFramesVector, storage: ("arc_frames_vector", 2096), texels: Some(("arc_frames_vector_texels", 2214)), converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::Frames, Store::Vector)), subgroups: false },
-    KernelCode { kernel: Kernel::ArcTimesAxisAngle, storage: ("arc_times_axis_angle", 3002), texels: Some(("arc_times_axis_angle_texels", 3159)), converting: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::Times, Store::AxisAngle)), subgroups: false },
-    KernelCode { kernel: Kernel::ArcTimesEuler, storage: ("arc_times_euler", 3659), texels: Some(("arc_times_euler_texels", 3812)), converting: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::Times, Store::Euler)), subgroups: false },
+    KernelCode { kernel: Kernel::ArcTimesAxisAngle, storage: ("arc_times_axis_angle", 3028), texels: Some(("arc_times_axis_angle_texels", 3185)), converting: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::Times, Store::AxisAngle)), subgroups: false },
+    KernelCode { kernel: Kernel::ArcTimesEuler, storage: ("arc_times_euler", 3680), texels: Some(("arc_times_euler_texels", 3833)), converting: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::Times, Store::Euler)), subgroups: false },
     KernelCode { kernel: Kernel::ArcTimesF16, storage: ("arc_times_f16", 2241), texels: Some(("arc_times_f16_texels", 2390)), converting: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::Times, Store::F16)), subgroups: false },
     KernelCode { kernel: Kernel::ArcTimesF32, storage: ("arc_times_f32", 1985), texels: Some(("arc_times_f32_texels", 2247)), converting: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::Times, Store::F32)), subgroups: false },
     KernelCode { kernel: Kernel::ArcTimesMatrix3x3, storage: ("arc_times_matrix3x3", 2665), texels: Some(("arc_times_matrix3x3_texels", 2818)), converting: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::Times, Store::Matrix3x3)), subgroups: false },
     KernelCode { kernel: Kernel::ArcTimesMatrix3x4, storage: ("arc_times_matrix3x4", 2703), texels: Some(("arc_times_matrix3x4_texels", 2856)), converting: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::Times, Store::Matrix3x4)), subgroups: false },
     KernelCode { kernel: Kernel::ArcTimesSnorm16, storage: ("arc_times_snorm16", 2122), texels: Some(("arc_times_snorm16_texels", 2271)), converting: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::Times, Store::Snorm16)), subgroups: false },
     KernelCode { kernel: Kernel::ArcTimesVector, storage: ("arc_times_vector", 2157), texels: Some(("arc_times_vector_texels", 2310)), converting: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::Times, Store::Vector)), subgroups: false },
-    KernelCode { kernel: Kernel::ArcSamplesAxisAngle, storage: ("arc_samples_axis_angle", 2616), texels: Some(("arc_samples_axis_angle_texels", 2667)), converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::Samples, Store::AxisAngle)), subgroups: false },
-    KernelCode { kernel: Kernel::ArcSamplesEuler, storage: ("arc_samples_euler", 3285), texels: Some(("arc_samples_euler_texels", 3328)), converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::Samples, Store::Euler)), subgroups: false },
+    KernelCode { kernel: Kernel::ArcSamplesAxisAngle, storage: ("arc_samples_axis_angle", 2642), texels: Some(("arc_samples_axis_angle_texels", 2693)), converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::Samples, Store::AxisAngle)), subgroups: false },
+    KernelCode { kernel: Kernel::ArcSamplesEuler, storage: ("arc_samples_euler", 3306), texels: Some(("arc_samples_euler_texels", 3349)), converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::Samples, Store::Euler)), subgroups: false },
     KernelCode { kernel: Kernel::ArcSamplesF16, storage: ("arc_samples_f16", 1859), texels: Some(("arc_samples_f16_texels", 1902)), converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::Samples, Store::F16)), subgroups: false },
     KernelCode { kernel: Kernel::ArcSamplesF32, storage: ("arc_samples_f32", 1599), texels: Some(("arc_samples_f32_texels", 1755)), converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::Samples, Store::F32)), subgroups: false },
     KernelCode { kernel: Kernel::ArcSamplesMatrix3x3, storage: ("arc_samples_matrix3x3", 2291), texels: Some(("arc_samples_matrix3x3_texels", 2334)), converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::Samples, Store::Matrix3x3)), subgroups: false },
     KernelCode { kernel: Kernel::ArcSamplesMatrix3x4, storage: ("arc_samples_matrix3x4", 2325), texels: Some(("arc_samples_matrix3x4_texels", 2372)), converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::Samples, Store::Matrix3x4)), subgroups: false },
     KernelCode { kernel: Kernel::ArcSamplesSnorm16, storage: ("arc_samples_snorm16", 1740), texels: Some(("arc_samples_snorm16_texels", 1783)), converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::Samples, Store::Snorm16)), subgroups: false },
     KernelCode { kernel: Kernel::ArcSamplesVector, storage: ("arc_samples_vector", 1779), texels: Some(("arc_samples_vector_texels", 1826)), converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::Samples, Store::Vector)), subgroups: false },
-    KernelCode { kernel: Kernel::ArcFramesCoalescedAxisAngle, storage: ("arc_frames_coalesced_axis_angle", 3722), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::FramesCoalesced, Store::AxisAngle)), subgroups: false },
-    KernelCode { kernel: Kernel::ArcFramesCoalescedEuler, storage: ("arc_frames_coalesced_euler", 4624), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::FramesCoalesced, Store::Euler)), subgroups: false },
+    KernelCode { kernel: Kernel::ArcFramesCoalescedAxisAngle, storage: ("arc_frames_coalesced_axis_angle", 3748), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::FramesCoalesced, Store::AxisAngle)), subgroups: false },
+    KernelCode { kernel: Kernel::ArcFramesCoalescedEuler, storage: ("arc_frames_coalesced_euler", 4645), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::FramesCoalesced, Store::Euler)), subgroups: false },
     KernelCode { kernel: Kernel::ArcFramesCoalescedF16, storage: ("arc_frames_coalesced_f16", 2965), texels: None, converting: Some(("arc_frames_coalesced_f16_converting", 2791)), bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::FramesCoalesced, Store::F16)), subgroups: false },
     KernelCode { kernel: Kernel::ArcFramesCoalescedF32, storage: ("arc_frames_coalesced_f32", 2705), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::FramesCoalesced, Store::F32)), subgroups: false },
     KernelCode { kernel: Kernel::ArcFramesCoalescedMatrix3x3, storage: ("arc_frames_coalesced_matrix3x3", 3630), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::FramesCoalesced, Store::Matrix3x3)), subgroups: false },
     KernelCode { kernel: Kernel::ArcFramesCoalescedMatrix3x4, storage: ("arc_frames_coalesced_matrix3x4", 3664), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::FramesCoalesced, Store::Matrix3x4)), subgroups: false },
     KernelCode { kernel: Kernel::ArcFramesCoalescedSnorm16, storage: ("arc_frames_coalesced_snorm16", 2846), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::FramesCoalesced, Store::Snorm16)), subgroups: false },
     KernelCode { kernel: Kernel::ArcFramesCoalescedVector, storage: ("arc_frames_coalesced_vector", 3117), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::FramesCoalesced, Store::Vector)), subgroups: false },
-    KernelCode { kernel: Kernel::ArcTimesCoalescedAxisAngle, storage: ("arc_times_coalesced_axis_angle", 3787), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::TimesCoalesced, Store::AxisAngle)), subgroups: false },
-    KernelCode { kernel: Kernel::ArcTimesCoalescedEuler, storage: ("arc_times_coalesced_euler", 4685), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::TimesCoalesced, Store::Euler)), subgroups: false },
+    KernelCode { kernel: Kernel::ArcTimesCoalescedAxisAngle, storage: ("arc_times_coalesced_axis_angle", 3813), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::TimesCoalesced, Store::AxisAngle)), subgroups: false },
+    KernelCode { kernel: Kernel::ArcTimesCoalescedEuler, storage: ("arc_times_coalesced_euler", 4706), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::TimesCoalesced, Store::Euler)), subgroups: false },
     KernelCode { kernel: Kernel::ArcTimesCoalescedF16, storage: ("arc_times_coalesced_f16", 3030), texels: None, converting: Some(("arc_times_coalesced_f16_converting", 2856)), bindings: &[Read, Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::TimesCoalesced, Store::F16)), subgroups: false },
     KernelCode { kernel: Kernel::ArcTimesCoalescedF32, storage: ("arc_times_coalesced_f32", 2770), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::TimesCoalesced, Store::F32)), subgroups: false },
     KernelCode { kernel: Kernel::ArcTimesCoalescedMatrix3x3, storage: ("arc_times_coalesced_matrix3x3", 3691), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::TimesCoalesced, Store::Matrix3x3)), subgroups: false },
     KernelCode { kernel: Kernel::ArcTimesCoalescedMatrix3x4, storage: ("arc_times_coalesced_matrix3x4", 3729), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::TimesCoalesced, Store::Matrix3x4)), subgroups: false },
     KernelCode { kernel: Kernel::ArcTimesCoalescedSnorm16, storage: ("arc_times_coalesced_snorm16", 2911), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::TimesCoalesced, Store::Snorm16)), subgroups: false },
     KernelCode { kernel: Kernel::ArcTimesCoalescedVector, storage: ("arc_times_coalesced_vector", 3178), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::TimesCoalesced, Store::Vector)), subgroups: false },
-    KernelCode { kernel: Kernel::ArcFramesSpreadAxisAngle, storage: ("arc_frames_spread_axis_angle", 4183), texels: None, converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::FramesSpread, Store::AxisAngle)), subgroups: false },
-    KernelCode { kernel: Kernel::ArcFramesSpreadEuler, storage: ("arc_frames_spread_euler", 4951), texels: None, converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::FramesSpread, Store::Euler)), subgroups: false },
-    KernelCode { kernel: Kernel::ArcFramesSpreadF16, storage: ("arc_frames_spread_f16", 3422), texels: None, converting: Some(("arc_frames_spread_f16_converting", 3243)), bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::FramesSpread, Store::F16)), subgroups: false },
-    KernelCode { kernel: Kernel::ArcFramesSpreadF32, storage: ("arc_frames_spread_f32", 3166), texels: None, converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::FramesSpread, Store::F32)), subgroups: false },
-    KernelCode { kernel: Kernel::ArcFramesSpreadMatrix3x3, storage: ("arc_frames_spread_matrix3x3", 3957), texels: None, converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::FramesSpread, Store::Matrix3x3)), subgroups: false },
-    KernelCode { kernel: Kernel::ArcFramesSpreadMatrix3x4, storage: ("arc_frames_spread_matrix3x4", 3991), texels: None, converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::FramesSpread, Store::Matrix3x4)), subgroups: false },
-    KernelCode { kernel: Kernel::ArcFramesSpreadSnorm16, storage: ("arc_frames_spread_snorm16", 3303), texels: None, converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::FramesSpread, Store::Snorm16)), subgroups: false },
-    KernelCode { kernel: Kernel::ArcFramesSpreadVector, storage: ("arc_frames_spread_vector", 3449), texels: None, converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::FramesSpread, Store::Vector)), subgroups: false },
-    KernelCode { kernel: Kernel::ArcTimesSpreadAxisAngle, storage: ("arc_times_spread_axis_angle", 4261), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::TimesSpread, Store::AxisAngle)), subgroups: false },
-    KernelCode { kernel: Kernel::ArcTimesSpreadEuler, storage: ("arc_times_spread_euler", 5020), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::TimesSpread, Store::Euler)), subgroups: false },
-    KernelCode { kernel: Kernel::ArcTimesSpreadF16, storage: ("arc_times_spread_f16", 3500), texels: None, converting: Some(("arc_times_spread_f16_converting", 3321)), bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::TimesSpread, Store::F16)), subgroups: false },
-    KernelCode { kernel: Kernel::ArcTimesSpreadF32, storage: ("arc_times_spread_f32", 3244), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::TimesSpread, Store::F32)), subgroups: false },
-    KernelCode { kernel: Kernel::ArcTimesSpreadMatrix3x3, storage: ("arc_times_spread_matrix3x3", 4026), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::TimesSpread, Store::Matrix3x3)), subgroups: false },
-    KernelCode { kernel: Kernel::ArcTimesSpreadMatrix3x4, storage: ("arc_times_spread_matrix3x4", 4064), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::TimesSpread, Store::Matrix3x4)), subgroups: false },
-    KernelCode { kernel: Kernel::ArcTimesSpreadSnorm16, storage: ("arc_times_spread_snorm16", 3381), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::TimesSpread, Store::Snorm16)), subgroups: false },
-    KernelCode { kernel: Kernel::ArcTimesSpreadVector, storage: ("arc_times_spread_vector", 3518), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::TimesSpread, Store::Vector)), subgroups: false },
-    KernelCode { kernel: Kernel::PolynomialFramesAxisAngle, storage: ("polynomial_frames_axis_angle", 2557), texels: Some(("polynomial_frames_axis_angle_texels", 2846)), converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Polynomial, List::Frames, Store::AxisAngle)), subgroups: false },
-    KernelCode { kernel: Kernel::PolynomialFramesEuler, storage: ("polynomial_frames_euler", 3218), texels: Some(("polynomial_frames_euler_texels", 3499)), converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Polynomial, List::Frames, Store::Euler)), subgroups: false },
+    KernelCode { kernel: Kernel::ArcFramesSpreadAxisAngle, storage: ("arc_frames_spread_axis_angle", 4342), texels: None, converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::FramesSpread, Store::AxisAngle)), subgroups: false },
+    KernelCode { kernel: Kernel::ArcFramesSpreadEuler, storage: ("arc_frames_spread_euler", 5188), texels: None, converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::FramesSpread, Store::Euler)), subgroups: false },
+    KernelCode { kernel: Kernel::ArcFramesSpreadF16, storage: ("arc_frames_spread_f16", 3555), texels: None, converting: Some(("arc_frames_spread_f16_converting", 3376)), bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::FramesSpread, Store::F16)), subgroups: false },
+    KernelCode { kernel: Kernel::ArcFramesSpreadF32, storage: ("arc_frames_spread_f32", 3299), texels: None, converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::FramesSpread, Store::F32)), subgroups: false },
+    KernelCode { kernel: Kernel::ArcFramesSpreadMatrix3x3, storage: ("arc_frames_spread_matrix3x3", 4169), texels: None, converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::FramesSpread, Store::Matrix3x3)), subgroups: false },
+    KernelCode { kernel: Kernel::ArcFramesSpreadMatrix3x4, storage: ("arc_frames_spread_matrix3x4", 4203), texels: None, converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::FramesSpread, Store::Matrix3x4)), subgroups: false },
+    KernelCode { kernel: Kernel::ArcFramesSpreadSnorm16, storage: ("arc_frames_spread_snorm16", 3436), texels: None, converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::FramesSpread, Store::Snorm16)), subgroups: false },
+    KernelCode { kernel: Kernel::ArcFramesSpreadVector, storage: ("arc_frames_spread_vector", 3661), texels: None, converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::FramesSpread, Store::Vector)), subgroups: false },
+    KernelCode { kernel: Kernel::ArcTimesSpreadAxisAngle, storage: ("arc_times_spread_axis_angle", 4429), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::TimesSpread, Store::AxisAngle)), subgroups: false },
+    KernelCode { kernel: Kernel::ArcTimesSpreadEuler, storage: ("arc_times_spread_euler", 5266), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::TimesSpread, Store::Euler)), subgroups: false },
+    KernelCode { kernel: Kernel::ArcTimesSpreadF16, storage: ("arc_times_spread_f16", 3642), texels: None, converting: Some(("arc_times_spread_f16_converting", 3463)), bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::TimesSpread, Store::F16)), subgroups: false },
+    KernelCode { kernel: Kernel::ArcTimesSpreadF32, storage: ("arc_times_spread_f32", 3386), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::TimesSpread, Store::F32)), subgroups: false },
+    KernelCode { kernel: Kernel::ArcTimesSpreadMatrix3x3, storage: ("arc_times_spread_matrix3x3", 4247), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::TimesSpread, Store::Matrix3x3)), subgroups: false },
+    KernelCode { kernel: Kernel::ArcTimesSpreadMatrix3x4, storage: ("arc_times_spread_matrix3x4", 4285), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::TimesSpread, Store::Matrix3x4)), subgroups: false },
+    KernelCode { kernel: Kernel::ArcTimesSpreadSnorm16, storage: ("arc_times_spread_snorm16", 3523), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::TimesSpread, Store::Snorm16)), subgroups: false },
+    KernelCode { kernel: Kernel::ArcTimesSpreadVector, storage: ("arc_times_spread_vector", 3739), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Arc, List::TimesSpread, Store::Vector)), subgroups: false },
+    KernelCode { kernel: Kernel::PolynomialFramesAxisAngle, storage: ("polynomial_frames_axis_angle", 2583), texels: Some(("polynomial_frames_axis_angle_texels", 2872)), converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Polynomial, List::Frames, Store::AxisAngle)), subgroups: false },
+    KernelCode { kernel: Kernel::PolynomialFramesEuler, storage: ("polynomial_frames_euler", 3239), texels: Some(("polynomial_frames_euler_texels", 3520)), converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Polynomial, List::Frames, Store::Euler)), subgroups: false },
     KernelCode { kernel: Kernel::PolynomialFramesF16, storage: ("polynomial_frames_f16", 1792), texels: Some(("polynomial_frames_f16_texels", 2073)), converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Polynomial, List::Frames, Store::F16)), subgroups: false },
     KernelCode { kernel: Kernel::PolynomialFramesF32, storage: ("polynomial_frames_f32", 1536), texels: Some(("polynomial_frames_f32_texels", 1930)), converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Polynomial, List::Frames, Store::F32)), subgroups: false },
     KernelCode { kernel: Kernel::PolynomialFramesMatrix3x3, storage: ("polynomial_frames_matrix3x3", 2224), texels: Some(("polynomial_frames_matrix3x3_texels", 2501)), converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Polynomial, List::Frames, Store::Matrix3x3)), subgroups: false },
     KernelCode { kernel: Kernel::PolynomialFramesMatrix3x4, storage: ("polynomial_frames_matrix3x4", 2262), texels: Some(("polynomial_frames_matrix3x4_texels", 2547)), converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Polynomial, List::Frames, Store::Matrix3x4)), subgroups: false },
     KernelCode { kernel: Kernel::PolynomialFramesSnorm16, storage: ("polynomial_frames_snorm16", 1673), texels: Some(("polynomial_frames_snorm16_texels", 1954)), converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Polynomial, List::Frames, Store::Snorm16)), subgroups: false },
     KernelCode { kernel: Kernel::PolynomialFramesVector, storage: ("polynomial_frames_vector", 1712), texels: Some(("polynomial_frames_vector_texels", 1993)), converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Polynomial, List::Frames, Store::Vector)), subgroups: false },
-    KernelCode { kernel: Kernel::PolynomialTimesAxisAngle, storage: ("polynomial_times_axis_angle", 2622), texels: Some(("polynomial_times_axis_angle_texels", 2942)), converting: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::Times, Store::AxisAngle)), subgroups: false },
-    KernelCode { kernel: Kernel::PolynomialTimesEuler, storage: ("polynomial_times_euler", 3279), texels: Some(("polynomial_times_euler_texels", 3595)), converting: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::Times, Store::Euler)), subgroups: false },
+    KernelCode { kernel: Kernel::PolynomialTimesAxisAngle, storage: ("polynomial_times_axis_angle", 2648), texels: Some(("polynomial_times_axis_angle_texels", 2968)), converting: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::Times, Store::AxisAngle)), subgroups: false },
+    KernelCode { kernel: Kernel::PolynomialTimesEuler, storage: ("polynomial_times_euler", 3300), texels: Some(("polynomial_times_euler_texels", 3616)), converting: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::Times, Store::Euler)), subgroups: false },
     KernelCode { kernel: Kernel::PolynomialTimesF16, storage: ("polynomial_times_f16", 1857), texels: Some(("polynomial_times_f16_texels", 2169)), converting: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::Times, Store::F16)), subgroups: false },
     KernelCode { kernel: Kernel::PolynomialTimesF32, storage: ("polynomial_times_f32", 1601), texels: Some(("polynomial_times_f32_texels", 2026)), converting: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::Times, Store::F32)), subgroups: false },
     KernelCode { kernel: Kernel::PolynomialTimesMatrix3x3, storage: ("polynomial_times_matrix3x3", 2285), texels: Some(("polynomial_times_matrix3x3_texels", 2597)), converting: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::Times, Store::Matrix3x3)), subgroups: false },
     KernelCode { kernel: Kernel::PolynomialTimesMatrix3x4, storage: ("polynomial_times_matrix3x4", 2327), texels: Some(("polynomial_times_matrix3x4_texels", 2643)), converting: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::Times, Store::Matrix3x4)), subgroups: false },
     KernelCode { kernel: Kernel::PolynomialTimesSnorm16, storage: ("polynomial_times_snorm16", 1738), texels: Some(("polynomial_times_snorm16_texels", 2050)), converting: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::Times, Store::Snorm16)), subgroups: false },
     KernelCode { kernel: Kernel::PolynomialTimesVector, storage: ("polynomial_times_vector", 1773), texels: Some(("polynomial_times_vector_texels", 2089)), converting: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::Times, Store::Vector)), subgroups: false },
-    KernelCode { kernel: Kernel::PolynomialSamplesAxisAngle, storage: ("polynomial_samples_axis_angle", 2236), texels: Some(("polynomial_samples_axis_angle_texels", 2450)), converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Polynomial, List::Samples, Store::AxisAngle)), subgroups: false },
-    KernelCode { kernel: Kernel::PolynomialSamplesEuler, storage: ("polynomial_samples_euler", 2905), texels: Some(("polynomial_samples_euler_texels", 3107)), converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Polynomial, List::Samples, Store::Euler)), subgroups: false },
+    KernelCode { kernel: Kernel::PolynomialSamplesAxisAngle, storage: ("polynomial_samples_axis_angle", 2262), texels: Some(("polynomial_samples_axis_angle_texels", 2476)), converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Polynomial, List::Samples, Store::AxisAngle)), subgroups: false },
+    KernelCode { kernel: Kernel::PolynomialSamplesEuler, storage: ("polynomial_samples_euler", 2926), texels: Some(("polynomial_samples_euler_texels", 3128)), converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Polynomial, List::Samples, Store::Euler)), subgroups: false },
     KernelCode { kernel: Kernel::PolynomialSamplesF16, storage: ("polynomial_samples_f16", 1475), texels: Some(("polynomial_samples_f16_texels", 1681)), converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Polynomial, List::Samples, Store::F16)), subgroups: false },
     KernelCode { kernel: Kernel::PolynomialSamplesF32, storage: ("polynomial_samples_f32", 1215), texels: Some(("polynomial_samples_f32_texels", 1534)), converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Polynomial, List::Samples, Store::F32)), subgroups: false },
     KernelCode { kernel: Kernel::PolynomialSamplesMatrix3x3, storage: ("polynomial_samples_matrix3x3", 1911), texels: Some(("polynomial_samples_matrix3x3_texels", 2109)), converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Polynomial, List::Samples, Store::Matrix3x3)), subgroups: false },
     KernelCode { kernel: Kernel::PolynomialSamplesMatrix3x4, storage: ("polynomial_samples_matrix3x4", 1949), texels: Some(("polynomial_samples_matrix3x4_texels", 2155)), converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Polynomial, List::Samples, Store::Matrix3x4)), subgroups: false },
     KernelCode { kernel: Kernel::PolynomialSamplesSnorm16, storage: ("polynomial_samples_snorm16", 1356), texels: Some(("polynomial_samples_snorm16_texels", 1562)), converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Polynomial, List::Samples, Store::Snorm16)), subgroups: false },
     KernelCode { kernel: Kernel::PolynomialSamplesVector, storage: ("polynomial_samples_vector", 1395), texels: Some(("polynomial_samples_vector_texels", 1601)), converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Polynomial, List::Samples, Store::Vector)), subgroups: false },
-    KernelCode { kernel: Kernel::PolynomialFramesCoalescedAxisAngle, storage: ("polynomial_frames_coalesced_axis_angle", 3342), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::FramesCoalesced, Store::AxisAngle)), subgroups: false },
-    KernelCode { kernel: Kernel::PolynomialFramesCoalescedEuler, storage: ("polynomial_frames_coalesced_euler", 4244), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::FramesCoalesced, Store::Euler)), subgroups: false },
+    KernelCode { kernel: Kernel::PolynomialFramesCoalescedAxisAngle, storage: ("polynomial_frames_coalesced_axis_angle", 3368), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::FramesCoalesced, Store::AxisAngle)), subgroups: false },
+    KernelCode { kernel: Kernel::PolynomialFramesCoalescedEuler, storage: ("polynomial_frames_coalesced_euler", 4265), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::FramesCoalesced, Store::Euler)), subgroups: false },
     KernelCode { kernel: Kernel::PolynomialFramesCoalescedF16, storage: ("polynomial_frames_coalesced_f16", 2581), texels: None, converting: Some(("polynomial_frames_coalesced_f16_converting", 2407)), bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::FramesCoalesced, Store::F16)), subgroups: false },
     KernelCode { kernel: Kernel::PolynomialFramesCoalescedF32, storage: ("polynomial_frames_coalesced_f32", 2321), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::FramesCoalesced, Store::F32)), subgroups: false },
     KernelCode { kernel: Kernel::PolynomialFramesCoalescedMatrix3x3, storage: ("polynomial_frames_coalesced_matrix3x3", 3250), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::FramesCoalesced, Store::Matrix3x3)), subgroups: false },
     KernelCode { kernel: Kernel::PolynomialFramesCoalescedMatrix3x4, storage: ("polynomial_frames_coalesced_matrix3x4", 3288), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::FramesCoalesced, Store::Matrix3x4)), subgroups: false },
     KernelCode { kernel: Kernel::PolynomialFramesCoalescedSnorm16, storage: ("polynomial_frames_coalesced_snorm16", 2462), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::FramesCoalesced, Store::Snorm16)), subgroups: false },
     KernelCode { kernel: Kernel::PolynomialFramesCoalescedVector, storage: ("polynomial_frames_coalesced_vector", 2733), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::FramesCoalesced, Store::Vector)), subgroups: false },
-    KernelCode { kernel: Kernel::PolynomialTimesCoalescedAxisAngle, storage: ("polynomial_times_coalesced_axis_angle", 3407), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::TimesCoalesced, Store::AxisAngle)), subgroups: false },
-    KernelCode { kernel: Kernel::PolynomialTimesCoalescedEuler, storage: ("polynomial_times_coalesced_euler", 4305), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::TimesCoalesced, Store::Euler)), subgroups: false },
+    KernelCode { kernel: Kernel::PolynomialTimesCoalescedAxisAngle, storage: ("polynomial_times_coalesced_axis_angle", 3433), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::TimesCoalesced, Store::AxisAngle)), subgroups: false },
+    KernelCode { kernel: Kernel::PolynomialTimesCoalescedEuler, storage: ("polynomial_times_coalesced_euler", 4326), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::TimesCoalesced, Store::Euler)), subgroups: false },
     KernelCode { kernel: Kernel::PolynomialTimesCoalescedF16, storage: ("polynomial_times_coalesced_f16", 2646), texels: None, converting: Some(("polynomial_times_coalesced_f16_converting", 2472)), bindings: &[Read, Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::TimesCoalesced, Store::F16)), subgroups: false },
     KernelCode { kernel: Kernel::PolynomialTimesCoalescedF32, storage: ("polynomial_times_coalesced_f32", 2386), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::TimesCoalesced, Store::F32)), subgroups: false },
     KernelCode { kernel: Kernel::PolynomialTimesCoalescedMatrix3x3, storage: ("polynomial_times_coalesced_matrix3x3", 3311), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::TimesCoalesced, Store::Matrix3x3)), subgroups: false },
     KernelCode { kernel: Kernel::PolynomialTimesCoalescedMatrix3x4, storage: ("polynomial_times_coalesced_matrix3x4", 3353), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::TimesCoalesced, Store::Matrix3x4)), subgroups: false },
     KernelCode { kernel: Kernel::PolynomialTimesCoalescedSnorm16, storage: ("polynomial_times_coalesced_snorm16", 2527), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::TimesCoalesced, Store::Snorm16)), subgroups: false },
     KernelCode { kernel: Kernel::PolynomialTimesCoalescedVector, storage: ("polynomial_times_coalesced_vector", 2794), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::TimesCoalesced, Store::Vector)), subgroups: false },
-    KernelCode { kernel: Kernel::PolynomialFramesSpreadAxisAngle, storage: ("polynomial_frames_spread_axis_angle", 4042), texels: None, converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Polynomial, List::FramesSpread, Store::AxisAngle)), subgroups: false },
-    KernelCode { kernel: Kernel::PolynomialFramesSpreadEuler, storage: ("polynomial_frames_spread_euler", 4810), texels: None, converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Polynomial, List::FramesSpread, Store::Euler)), subgroups: false },
-    KernelCode { kernel: Kernel::PolynomialFramesSpreadF16, storage: ("polynomial_frames_spread_f16", 3277), texels: None, converting: Some(("polynomial_frames_spread_f16_converting", 3098)), bindings: &[Read, Read, Read, Write], segments: Some((Form::Polynomial, List::FramesSpread, Store::F16)), subgroups: false },
-    KernelCode { kernel: Kernel::PolynomialFramesSpreadF32, storage: ("polynomial_frames_spread_f32", 3021), texels: None, converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Polynomial, List::FramesSpread, Store::F32)), subgroups: false },
-    KernelCode { kernel: Kernel::PolynomialFramesSpreadMatrix3x3, storage: ("polynomial_frames_spread_matrix3x3", 3812), texels: None, converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Polynomial, List::FramesSpread, Store::Matrix3x3)), subgroups: false },
-    KernelCode { kernel: Kernel::PolynomialFramesSpreadMatrix3x4, storage: ("polynomial_frames_spread_matrix3x4", 3854), texels: None, converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Polynomial, List::FramesSpread, Store::Matrix3x4)), subgroups: false },
-    KernelCode { kernel: Kernel::PolynomialFramesSpreadSnorm16, storage: ("polynomial_frames_spread_snorm16", 3158), texels: None, converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Polynomial, List::FramesSpread, Store::Snorm16)), subgroups: false },
-    KernelCode { kernel: Kernel::PolynomialFramesSpreadVector, storage: ("polynomial_frames_spread_vector", 3304), texels: None, converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Polynomial, List::FramesSpread, Store::Vector)), subgroups: false },
-    KernelCode { kernel: Kernel::PolynomialTimesSpreadAxisAngle, storage: ("polynomial_times_spread_axis_angle", 4120), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::TimesSpread, Store::AxisAngle)), subgroups: false },
-    KernelCode { kernel: Kernel::PolynomialTimesSpreadEuler, storage: ("polynomial_times_spread_euler", 4879), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::TimesSpread, Store::Euler)), subgroups: false },
-    KernelCode { kernel: Kernel::PolynomialTimesSpreadF16, storage: ("polynomial_times_spread_f16", 3355), texels: None, converting: Some(("polynomial_times_spread_f16_converting", 3176)), bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::TimesSpread, Store::F16)), subgroups: false },
-    KernelCode { kernel: Kernel::PolynomialTimesSpreadF32, storage: ("polynomial_times_spread_f32", 3099), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::TimesSpread, Store::F32)), subgroups: false },
-    KernelCode { kernel: Kernel::PolynomialTimesSpreadMatrix3x3, storage: ("polynomial_times_spread_matrix3x3", 3881), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::TimesSpread, Store::Matrix3x3)), subgroups: false },
-    KernelCode { kernel: Kernel::PolynomialTimesSpreadMatrix3x4, storage: ("polynomial_times_spread_matrix3x4", 3927), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::TimesSpread, Store::Matrix3x4)), subgroups: false },
-    KernelCode { kernel: Kernel::PolynomialTimesSpreadSnorm16, storage: ("polynomial_times_spread_snorm16", 3236), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::TimesSpread, Store::Snorm16)), subgroups: false },
-    KernelCode { kernel: Kernel::PolynomialTimesSpreadVector, storage: ("polynomial_times_spread_vector", 3373), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::TimesSpread, Store::Vector)), subgroups: false },
+    KernelCode { kernel: Kernel::PolynomialFramesSpreadAxisAngle, storage: ("polynomial_frames_spread_axis_angle", 4213), texels: None, converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Polynomial, List::FramesSpread, Store::AxisAngle)), subgroups: false },
+    KernelCode { kernel: Kernel::PolynomialFramesSpreadEuler, storage: ("polynomial_frames_spread_euler", 5051), texels: None, converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Polynomial, List::FramesSpread, Store::Euler)), subgroups: false },
+    KernelCode { kernel: Kernel::PolynomialFramesSpreadF16, storage: ("polynomial_frames_spread_f16", 3422), texels: None, converting: Some(("polynomial_frames_spread_f16_converting", 3243)), bindings: &[Read, Read, Read, Write], segments: Some((Form::Polynomial, List::FramesSpread, Store::F16)), subgroups: false },
+    KernelCode { kernel: Kernel::PolynomialFramesSpreadF32, storage: ("polynomial_frames_spread_f32", 3166), texels: None, converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Polynomial, List::FramesSpread, Store::F32)), subgroups: false },
+    KernelCode { kernel: Kernel::PolynomialFramesSpreadMatrix3x3, storage: ("polynomial_frames_spread_matrix3x3", 4032), texels: None, converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Polynomial, List::FramesSpread, Store::Matrix3x3)), subgroups: false },
+    KernelCode { kernel: Kernel::PolynomialFramesSpreadMatrix3x4, storage: ("polynomial_frames_spread_matrix3x4", 4074), texels: None, converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Polynomial, List::FramesSpread, Store::Matrix3x4)), subgroups: false },
+    KernelCode { kernel: Kernel::PolynomialFramesSpreadSnorm16, storage: ("polynomial_frames_spread_snorm16", 3303), texels: None, converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Polynomial, List::FramesSpread, Store::Snorm16)), subgroups: false },
+    KernelCode { kernel: Kernel::PolynomialFramesSpreadVector, storage: ("polynomial_frames_spread_vector", 3524), texels: None, converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Polynomial, List::FramesSpread, Store::Vector)), subgroups: false },
+    KernelCode { kernel: Kernel::PolynomialTimesSpreadAxisAngle, storage: ("polynomial_times_spread_axis_angle", 4300), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::TimesSpread, Store::AxisAngle)), subgroups: false },
+    KernelCode { kernel: Kernel::PolynomialTimesSpreadEuler, storage: ("polynomial_times_spread_euler", 5129), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::TimesSpread, Store::Euler)), subgroups: false },
+    KernelCode { kernel: Kernel::PolynomialTimesSpreadF16, storage: ("polynomial_times_spread_f16", 3509), texels: None, converting: Some(("polynomial_times_spread_f16_converting", 3330)), bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::TimesSpread, Store::F16)), subgroups: false },
+    KernelCode { kernel: Kernel::PolynomialTimesSpreadF32, storage: ("polynomial_times_spread_f32", 3253), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::TimesSpread, Store::F32)), subgroups: false },
+    KernelCode { kernel: Kernel::PolynomialTimesSpreadMatrix3x3, storage: ("polynomial_times_spread_matrix3x3", 4110), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::TimesSpread, Store::Matrix3x3)), subgroups: false },
+    KernelCode { kernel: Kernel::PolynomialTimesSpreadMatrix3x4, storage: ("polynomial_times_spread_matrix3x4", 4156), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::TimesSpread, Store::Matrix3x4)), subgroups: false },
+    KernelCode { kernel: Kernel::PolynomialTimesSpreadSnorm16, storage: ("polynomial_times_spread_snorm16", 3390), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::TimesSpread, Store::Snorm16)), subgroups: false },
+    KernelCode { kernel: Kernel::PolynomialTimesSpreadVector, storage: ("polynomial_times_spread_vector", 3602), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Write], segments: Some((Form::Polynomial, List::TimesSpread, Store::Vector)), subgroups: false },
     KernelCode { kernel: Kernel::FromKeysArcs, storage: ("from_keys_arcs", 2423), texels: Some(("from_keys_arcs_texels", 2576)), converting: None, bindings: &[Read, Read, Write], segments: None, subgroups: false },
     KernelCode { kernel: Kernel::FromKeysTwoKeys, storage: ("from_keys_two_keys", 3183), texels: Some(("from_keys_two_keys_texels", 3336)), converting: None, bindings: &[Read, Read, Write], segments: None, subgroups: false },
     KernelCode { kernel: Kernel::FromKeysCubics, storage: ("from_keys_cubics", 5760), texels: Some(("from_keys_cubics_texels", 5904)), converting: None, bindings: &[Read, Read, Read, Write], segments: None, subgroups: false },
-    KernelCode { kernel: Kernel::PosesAdd, storage: ("poses_add", 3201), texels: None, converting: None, bindings: &[Read, Read, Read, Write], segments: None, subgroups: false },
-    KernelCode { kernel: Kernel::PosesBlend, storage: ("poses_blend", 3326), texels: None, converting: None, bindings: &[Read, Read, Write], segments: None, subgroups: false },
-    KernelCode { kernel: Kernel::PosesMix, storage: ("poses_mix", 3116), texels: None, converting: None, bindings: &[Read, Read, Read, Write], segments: None, subgroups: false },
-    KernelCode { kernel: Kernel::PosesSmooth, storage: ("poses_smooth", 3625), texels: None, converting: None, bindings: &[Read, Read, Read, Write], segments: None, subgroups: false },
-    KernelCode { kernel: Kernel::PosesSteps, storage: ("poses_steps", 3346), texels: None, converting: None, bindings: &[Read, Write], segments: None, subgroups: false },
-    KernelCode { kernel: Kernel::PosesWorld, storage: ("poses_world", 3378), texels: None, converting: None, bindings: &[Read, Read, ReadWrite], segments: None, subgroups: false },
-    KernelCode { kernel: Kernel::CrowdRotations, storage: ("crowd_rotations", 5769), texels: Some(("crowd_rotations_texels", 5855)), converting: None, bindings: &[Read, Read, Read, Read, Write], segments: None, subgroups: false },
+    KernelCode { kernel: Kernel::PosesAdd, storage: ("poses_add", 3227), texels: None, converting: None, bindings: &[Read, Read, Read, Write], segments: None, subgroups: false },
+    KernelCode { kernel: Kernel::PosesBlend, storage: ("poses_blend", 3352), texels: None, converting: None, bindings: &[Read, Read, Write], segments: None, subgroups: false },
+    KernelCode { kernel: Kernel::PosesMix, storage: ("poses_mix", 3142), texels: None, converting: None, bindings: &[Read, Read, Read, Write], segments: None, subgroups: false },
+    KernelCode { kernel: Kernel::PosesSmooth, storage: ("poses_smooth", 3651), texels: None, converting: None, bindings: &[Read, Read, Read, Write], segments: None, subgroups: false },
+    KernelCode { kernel: Kernel::PosesSteps, storage: ("poses_steps", 3372), texels: None, converting: None, bindings: &[Read, Write], segments: None, subgroups: false },
+    KernelCode { kernel: Kernel::PosesWorld, storage: ("poses_world", 3404), texels: None, converting: None, bindings: &[Read, Read, ReadWrite], segments: None, subgroups: false },
+    KernelCode { kernel: Kernel::CrowdRotations, storage: ("crowd_rotations", 5795), texels: Some(("crowd_rotations_texels", 5881)), converting: None, bindings: &[Read, Read, Read, Read, Write], segments: None, subgroups: false },
     KernelCode { kernel: Kernel::CrowdPlainRotations, storage: ("crowd_plain_rotations", 2408), texels: Some(("crowd_plain_rotations_texels", 2500)), converting: None, bindings: &[Read, Read, Read, Read, Write], segments: None, subgroups: false },
-    KernelCode { kernel: Kernel::CrowdLocals, storage: ("crowd_locals", 6366), texels: Some(("crowd_locals_texels", 6452)), converting: None, bindings: &[Read, Read, Read, Read, Write], segments: None, subgroups: false },
+    KernelCode { kernel: Kernel::CrowdLocals, storage: ("crowd_locals", 6392), texels: Some(("crowd_locals_texels", 6478)), converting: None, bindings: &[Read, Read, Read, Read, Write], segments: None, subgroups: false },
     KernelCode { kernel: Kernel::CrowdPlainLocals, storage: ("crowd_plain_locals", 3009), texels: Some(("crowd_plain_locals_texels", 3101)), converting: None, bindings: &[Read, Read, Read, Read, Write], segments: None, subgroups: false },
     KernelCode { kernel: Kernel::CrowdGather, storage: ("crowd_gather", 565), texels: None, converting: None, bindings: &[Read, Read, Write], segments: None, subgroups: false },
     KernelCode { kernel: Kernel::CrowdScatter, storage: ("crowd_scatter", 463), texels: None, converting: None, bindings: &[Read, Write], segments: None, subgroups: false },
@@ -1175,10 +1253,14 @@ pub(crate) static KERNELS: [KernelCode; 139] = [
     KernelCode { kernel: Kernel::CrowdWalkAll, storage: ("crowd_walk_all", 1260), texels: None, converting: None, bindings: &[Read, ReadWrite], segments: None, subgroups: false },
     KernelCode { kernel: Kernel::CrowdSkin, storage: ("crowd_skin", 767), texels: None, converting: None, bindings: &[Read, ReadWrite], segments: None, subgroups: false },
     KernelCode { kernel: Kernel::CrowdHalf, storage: ("crowd_half", 777), texels: None, converting: None, bindings: &[Read, Write], segments: None, subgroups: false },
-    KernelCode { kernel: Kernel::CrowdWholeRotations, storage: ("crowd_whole_rotations", 8555), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Read, Read, Write, Write], segments: None, subgroups: false },
+    KernelCode { kernel: Kernel::CrowdWholeRotations, storage: ("crowd_whole_rotations", 8581), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Read, Read, Write, Write], segments: None, subgroups: false },
     KernelCode { kernel: Kernel::CrowdPlainWholeRotations, storage: ("crowd_plain_whole_rotations", 5227), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Read, Read, Write, Write], segments: None, subgroups: false },
-    KernelCode { kernel: Kernel::CrowdWholeMatrices, storage: ("crowd_whole_matrices", 10248), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Read, Read, Read, Read, Write, Write], segments: None, subgroups: false },
+    KernelCode { kernel: Kernel::CrowdWholeMatrices, storage: ("crowd_whole_matrices", 10274), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Read, Read, Read, Read, Write, Write], segments: None, subgroups: false },
     KernelCode { kernel: Kernel::CrowdPlainWholeMatrices, storage: ("crowd_plain_whole_matrices", 6928), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Read, Read, Read, Read, Write, Write], segments: None, subgroups: false },
     KernelCode { kernel: Kernel::CrowdSubgroupRotations, storage: ("crowd_subgroup_rotations", 4532), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Read, Read, Write], segments: None, subgroups: true },
+    KernelCode { kernel: Kernel::MotionJoints, storage: ("motion_joints", 8600), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Read, Read, Write], segments: None, subgroups: false },
+    KernelCode { kernel: Kernel::MotionWalk, storage: ("motion_walk", 3912), texels: None, converting: None, bindings: &[Read, ReadWrite], segments: None, subgroups: false },
+    KernelCode { kernel: Kernel::MotionDifferences, storage: ("motion_differences", 3595), texels: None, converting: None, bindings: &[Read, ReadWrite], segments: None, subgroups: false },
+    KernelCode { kernel: Kernel::MotionStore, storage: ("motion_store", 625), texels: None, converting: None, bindings: &[Read, Write], segments: None, subgroups: false },
     KernelCode { kernel: Kernel::PrepareArcs, storage: ("prepare_arcs", 1870), texels: None, converting: None, bindings: &[Read, Read, Write], segments: None, subgroups: false },
 ];

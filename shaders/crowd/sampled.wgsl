@@ -1,4 +1,4 @@
-// Evaluates one channel of a joint in one layer of an instance.
+// Evaluates one channel of a joint.
 // Twin: src/twin/crowd_layers.rs.
 
 // The forms of channels: one constant; an arc's middle and tangent; the four coefficients of a cubic.
@@ -43,12 +43,4 @@ fn sampled(channel: CrowdChannel, at: CrowdPosition) -> vec4f {
         next = next + count;
     }
     return canonical(polynomial(coefficients, s));
-}
-
-// The `kind`th channel of a joint in one layer; `layer` counts within the window.
-fn layer_value(layer: u32, entry: CrowdEntry, joint: u32, kind: u32) -> vec4f {
-    let clip = entry.clip_and_weight & 0xffffu;
-    let channel = channel_at((clip * dispatch.joints + joint) * CHANNELS + kind);
-    let at = position_at(layer * dispatch.bases + (channel.form_and_base & 0xffffffu));
-    return sampled(channel, at);
 }

@@ -96,18 +96,6 @@ struct SmallAngleCubic {
     is_valid: bool,
 }
 
-fn cross3(a: vec3f, b: vec3f) -> vec3f {
-    return vec3f(
-        a.y * b.z - a.z * b.y,
-        a.z * b.x - a.x * b.z,
-        a.x * b.y - a.y * b.x,
-    );
-}
-
-fn dot3(a: vec3f, b: vec3f) -> f32 {
-    return a.x * b.x + a.y * b.y + a.z * b.z;
-}
-
 // The vector part of a⁻¹ (a + chord), the step from a to its next key.
 fn step_vector(a: vec4f, chord: vec4f) -> vec3f {
     return vec3f(

@@ -1,4 +1,6 @@
-// Runs that neighbouring invocations evaluate together, and the arguments of one dispatch over them.
+// Runs that neighbouring invocations evaluate together, and the arguments of one dispatch over them. Where the samples of
+// a track are neighbours in the result, the lanes of a run take neighbouring samples in turn. Where tracks are neighbours,
+// frame by frame, each lane takes all samples of a run of its track, and neighbouring lanes have neighbouring tracks.
 
 /// The arguments of one dispatch over spread runs.
 struct Spread {
@@ -10,12 +12,26 @@ struct Spread {
     item_count: u32,
     /// The number that is added to their `output`.
     first_output: u32,
-    /// The invocations of a run, as a power of two.
+    /// The lanes of a run, as a power of two.
     lanes_log2: u32,
+    /// The lanes of a run less one, if they have neighbouring samples; 0 if they have neighbouring tracks.
+    sample_mask: u32,
+    /// The lanes of a run less one, if they have neighbouring tracks; else 0.
+    track_mask: u32,
+    /// From a sample of a lane to its next one.
+    step: u32,
+    /// The same as a power of two.
+    step_log2: u32,
+    /// The distance in the result between neighbouring samples of a track, in values.
+    stride: u32,
     /// The invocations that store one line of memory, less one.
     line_mask: u32,
-    /// How many segments the runs of the next repetition are further on, where tracks with the same times share their
-    /// runs. A repetition is a layer of workgroups.
+    /// How often the runs are evaluated, where tracks with the same times share them. A layer of workgroups, along z,
+    /// evaluates one repetition, or one for each lane of a run.
+    repetitions: u32,
+    /// The repetitions of a layer of workgroups.
+    layer_repetitions: u32,
+    /// How many segments the runs of the next repetition are further on.
     segments: u32,
     /// How many constants they are further on.
     constants: u32,
@@ -23,8 +39,7 @@ struct Spread {
     outputs: u32,
 }
 
-/// Consecutive samples of one track that lie in one segment, or hold one constant. Its invocations take
-/// neighbouring samples in turn.
+/// Consecutive samples of one track that lie in one segment, or hold one constant.
 struct SpreadRun {
     /// The segment's index; the constant's, when `count` carries `IS_CONSTANT`.
     source: u32,
@@ -62,8 +77,9 @@ var<immediate> dispatch: Spread;
 
 // Where a run of a repetition finds its segment (x) and its key (z), and stores its first sample (y).
 fn location_of(item: SpreadRun, repetition: u32) -> vec3u {
-    let steps = vec3u(dispatch.segments, dispatch.outputs, dispatch.constants);
-    let listed = vec3u(item.source, item.output + dispatch.first_output, item.key);
+    let all = dispatch;
+    let steps = vec3u(all.segments, all.outputs, all.constants);
+    let listed = vec3u(item.source, item.output + all.first_output, item.key);
     return listed + repetition * steps;
 }
 
@@ -76,9 +92,10 @@ fn sample_count(item: SpreadRun) -> u32 {
     return item.count & ~(IS_CONSTANT | NEEDS_CARE);
 }
 
-// The value at the `j`th sample of a run that needs no care and has no key there. `constant` is its segment's.
-fn evaluate_near(item: SpreadRun, segment: Segment, constant: f32, j: u32) -> vec4f {
-    let parameter = near_distance(item.first, j) * item.scale + item.offset;
+// The value at a sample of a run that needs no care and has no key there. `at` is the run's `first` for this sample, and
+// `constant` its segment's.
+fn evaluate_near(item: SpreadRun, segment: Segment, constant: f32, at: i32) -> vec4f {
+    let parameter = near_distance(at) * item.scale + item.offset;
     return evaluate_with(segment, constant, parameter);
 }
 

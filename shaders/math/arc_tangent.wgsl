@@ -60,10 +60,8 @@ fn root(x: f32) -> f32 {
     return near + (x - near * near) * (0.5 * reciprocal_root(x));
 }
 
-// The angle of the point (x, y), from -pi to pi; 0 for (0, 0).
-fn arc_tangent(y: f32, x: f32) -> f32 {
-    let up = magnitude(y);
-    let along = magnitude(x);
+// The angle of the point (along, up), neither of which is negative, from 0 to pi/2; 0 for (0, 0).
+fn acute_arc_tangent(up: f32, along: f32) -> f32 {
     let steep = up > along;
     let large = select(along, up, steep);
     let small = select(up, along, steep);
@@ -75,7 +73,12 @@ fn arc_tangent(y: f32, x: f32) -> f32 {
     let high = (((ARC_8 * z + ARC_7) * z + ARC_6) * z + ARC_5) * z + ARC_4;
     let tail = (((high * z + ARC_3) * z + ARC_2) * z + ARC_1) * z + ARC_0;
     let flat = tail * (z * t) + t;
-    let acute = select(flat, (HALF_PI - flat) + HALF_PI_LOW, steep);
+    return select(flat, (HALF_PI - flat) + HALF_PI_LOW, steep);
+}
+
+// The angle of the point (x, y), from -pi to pi; 0 for (0, 0).
+fn arc_tangent(y: f32, x: f32) -> f32 {
+    let acute = acute_arc_tangent(magnitude(y), magnitude(x));
     let obtuse = select(acute, (PI - acute) + PI_LOW, x < 0.0);
     return select(obtuse, -obtuse, y < 0.0);
 }

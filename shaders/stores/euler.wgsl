@@ -50,11 +50,12 @@ fn euler(rotation: vec4f, detail: u32) -> vec3f {
     let outer = select(select(difference, sum * third_sign, intrinsic), together, locked);
     let inner = select(select(sum * third_sign, difference, intrinsic), 0.0, locked);
     let first = select(outer, outer * third_sign, locked && intrinsic);
-    let whole = 2.0 * arc_tangent(sine, cosine);
+    // From 0 to pi, so the second angle needs no other turn.
+    let whole = 2.0 * acute_arc_tangent(sine, cosine);
     let second = select((whole - HALF_PI) - HALF_PI_LOW, whole, symmetric);
     return vec3f(
         wrapped(first) * DEGREES,
-        wrapped(second) * DEGREES,
+        second * DEGREES,
         wrapped(inner) * DEGREES,
     );
 }

@@ -1,20 +1,13 @@
-//! The curve of one channel of a clip, before it is stored in the tables of a library, and the forms that only the CPU
-//! reads.
+//! The curve of one channel of a clip, before it is stored in the tables of a library.
 
 use bytemuck::Zeroable as _;
 
-use crate::shader::{CrowdSpan, FORM_ARC, FORM_CONSTANT, FORM_CUBIC, ON_KEY, POWERS};
+use crate::shader::{
+    CrowdSpan, FORM_ARC, FORM_CONSTANT, FORM_CUBIC, FORM_KEYS, FORM_LINE, FORM_PACKED, ON_KEY,
+    POWERS,
+};
 use crate::simd::lanes::{Lanes, MAX_LANES};
 use crate::twin::arc_between::arc_between;
-
-/// Rotations on arcs, as their keys: a cell for each.
-pub(crate) const FORM_KEYS: u32 = 16;
-
-/// Rotations on arcs, as packed keys: half a cell for each. The first key of a channel is counted in halves.
-pub(crate) const FORM_PACKED: u32 = 17;
-
-/// Translations on straight lines, as their keys.
-pub(crate) const FORM_LINE: u32 = 18;
 
 /// One channel before it is stored in the tables: its spans, and the constants of each.
 #[derive(Default)]

@@ -1,13 +1,17 @@
 //! Curves of motion tables that are kept as their keys, where these determine them: the arcs of slerp and straight
 //! lines. What a sample needs of them is computed when it is taken, so that a key takes 16 bytes instead of 48 for
-//! rotations, 16 instead of 80 for translations, and 8 if rotations are packed. Kernels do not read these forms.
+//! rotations, 16 instead of 80 for translations, and 8 if rotations are packed. Of the kernels those over states alone read
+//! these forms (`shaders/motion/joints.wgsl`, with `shaders/motion/packed.wgsl`); a crowd's do not.
 
 use glam::Vec4;
 
-use crate::crowd::channel_curve::{ChannelCurve, FORM_KEYS, FORM_LINE, FORM_PACKED, arcs_between};
+use crate::crowd::channel_curve::{ChannelCurve, arcs_between};
 use crate::math::canonical::{canonical, round_f32};
 use crate::math::quaternion::{dot, unit};
-use crate::shader::{CrowdChannel, CrowdSpan, FORM_ARC, FORM_CUBIC, ON_KEY};
+use crate::shader::{
+    CrowdChannel, CrowdSpan, FORM_ARC, FORM_CUBIC, FORM_KEYS, FORM_LINE, FORM_PACKED, ON_KEY,
+    PACKED_STEP,
+};
 use crate::simd::lanes::Lanes;
 use crate::twin::arc_between::arc_between;
 use crate::twin::functions::cubic;
@@ -17,6 +21,8 @@ const LIMIT: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
 /// The largest whole number of a packed component, which has 20 bits.
 const LARGEST: i32 = (1 << 19) - 1;
+
+const _: () = assert!(PACKED_STEP == (LIMIT / LARGEST as f64) as f32);
 
 /// How keys of rotations are stored in [`MotionTables`](crate::crowd::MotionTables).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -118,7 +124,7 @@ fn next(index: usize, count: usize) -> usize {
 
 /// The middle of a line, and its rise.
 #[inline(always)]
-fn line_between(from: [f32; 4], to: [f32; 4]) -> [[f32; 4]; 2] {
+pub(crate) fn line_between(from: [f32; 4], to: [f32; 4]) -> [[f32; 4]; 2] {
     let [from, to] = [from, to].map(|key| key.map(f64::from));
     [
         std::array::from_fn(|c| round_f32((from[c] + to[c]) * 0.5)),
@@ -155,9 +161,8 @@ fn packed(key: [f32; 4]) -> [f32; 4] {
 
 /// The rotation that [`packed`] stored.
 #[inline(always)]
-fn unpacked([low, high]: [u32; 2]) -> [f32; 4] {
-    const STEP: f32 = (LIMIT / LARGEST as f64) as f32;
-    let field = |bits: u32| ((bits << 12) as i32 >> 12) as f32 * STEP;
+pub(crate) fn unpacked([low, high]: [u32; 2]) -> [f32; 4] {
+    let field = |bits: u32| ((bits << 12) as i32 >> 12) as f32 * PACKED_STEP;
     let (a, b, c) = (field(low), field(low >> 20 | high << 12), field(high >> 8));
     let square = a * a + b * b + c * c;
     let d = (1.0 - square).max(0.0).sqrt();

@@ -6,7 +6,7 @@ use std::ops::Range;
 use bytemuck::Zeroable as _;
 use glam::Vec3;
 
-use crate::crowd::channel_curve::{ChannelCurve, FORM_PACKED};
+use crate::crowd::channel_curve::ChannelCurve;
 use crate::crowd::clip_keys::{KeyPrecision, keeps_keys, keys_of, pack};
 use crate::crowd_error::{CrowdError, MAX_TICKS};
 use crate::curve::options::Quantity;
@@ -18,7 +18,7 @@ use crate::prepare::clip_data::{ClipData, PrepareRequest};
 use crate::prepare::vectors::VectorRequest;
 use crate::shader::{
     CHANNELS, CrowdBase, CrowdChannel, CrowdClip, CrowdSpan, FORM_ARC, FORM_CONSTANT, FORM_CUBIC,
-    FORM_POLYNOMIAL, Form, ON_KEY, POWERS, SCALE,
+    FORM_PACKED, FORM_POLYNOMIAL, Form, ON_KEY, POWERS, SCALE,
 };
 use crate::simd::lanes::{Lanes, MAX_LANES, canonical};
 use crate::time::frame_clock::{FrameClock, FrameStart, TrackCopy, in_frames};
@@ -48,8 +48,8 @@ pub(crate) struct ClipTables {
     /// Ranges of consecutive joints whose rotations have one form and one time base and are adjacent in memory,
     /// `runs[clip]`.
     pub(crate) runs: Vec<Vec<Range<u32>>>,
-    /// Whether the curves of clips keep their keys where these are enough; `None`: constants alone, as kernels read
-    /// them.
+    /// Whether the curves of clips keep their keys where these are enough; `None`: constants alone, as the kernels of
+    /// crowds read them.
     pub(crate) keys: Option<KeyPrecision>,
 }
 

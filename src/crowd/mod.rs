@@ -13,7 +13,7 @@
 //! * [`CrowdFade`]: a layer's weight as a function of the clock.
 //! * [`CrowdOutput`]: which values an evaluation stores for each joint ([`CrowdValues`]), in 32 or 16 bits.
 //! * [`MotionTables`] and [`MotionStates`]: clips without instances, for the training of models of motion.
-//!   [`MotionBuilder`] collects them.
+//!   [`MotionBuilder`] collects them. With the feature `vulkan`, a `DeviceMotions` has them on a device.
 //!
 //! # Steps
 //!
@@ -44,6 +44,8 @@
 pub(crate) mod channel_curve;
 pub(crate) mod clip_keys;
 pub(crate) mod clip_tables;
+#[cfg(feature = "vulkan")]
+pub(crate) mod device_motions;
 pub(crate) mod fade;
 pub(crate) mod instances;
 pub(crate) mod lay_over;
@@ -55,10 +57,16 @@ pub(crate) mod stages;
 pub(crate) mod states;
 
 pub use crate::crowd::clip_keys::KeyPrecision;
+#[cfg(feature = "vulkan")]
+pub use crate::crowd::device_motions::DeviceMotions;
 pub use crate::crowd::fade::CrowdFade;
 pub use crate::crowd::layer::{CrowdLayer, LayerBlend};
 pub use crate::crowd::library::{CrowdLibrary, MotionBuilder, MotionClip};
 pub use crate::crowd::player::Crowd;
 pub use crate::crowd::states::{FrameStep, MotionStates, MotionTables, MotionWords};
 pub use crate::crowd_error::CrowdError;
+#[cfg(feature = "vulkan")]
+pub use crate::gpu::motion::MappedStates;
 pub use crate::output::crowd::{CrowdOutput, CrowdValues};
+#[cfg(feature = "vulkan")]
+pub use crate::output::states::StateArray;

@@ -1,12 +1,13 @@
 //! States of a library's clips at any times: rotations, positions and velocities of all joints, for the training of
 //! models of motion. The rotations have a crowd's bits. The rest is computed from them with sums and products alone,
-//! so that every machine has the same bits.
+//! so that every machine has the same bits. Twin of `shaders/motion/joints.wgsl`,
+//! `shaders/motion/walk.wgsl` and `shaders/motion/differences.wgsl`.
 
 use std::ops::Range;
 
 use rayon::prelude::*;
 
-use crate::crowd::channel_curve::{FORM_KEYS, FORM_LINE, FORM_PACKED, constants_of};
+use crate::crowd::channel_curve::constants_of;
 use crate::crowd::clip_keys::{KeyRows, keeps_keys};
 use crate::crowd::clip_tables::{ClipTables, arcs, runs_of};
 use crate::crowd_error::CrowdError;
@@ -15,12 +16,13 @@ use crate::math::canonical::canonical;
 use crate::math::quaternion::{cross3, dot, product, scaled, sum};
 use crate::shader::{
     CHANNELS, CrowdBase, CrowdChannel, CrowdClip, CrowdLink, CrowdPosition, CrowdSpan, FORM_ARC,
-    FORM_CONSTANT, FORM_CUBIC, FORM_POLYNOMIAL, ON_KEY, POWERS, TICKS, TRANSLATION,
+    FORM_CONSTANT, FORM_CUBIC, FORM_KEYS, FORM_LINE, FORM_PACKED, FORM_POLYNOMIAL, ON_KEY, POWERS,
+    TICKS, TRANSLATION,
 };
 use crate::simd::dispatch::{InLanes, in_lanes_of};
 use crate::simd::lanes::Lanes;
 use crate::threads::stop;
-use crate::twin::arc_tangent::arc_tangent;
+use crate::twin::arc_tangent::{arc_tangent, flushed, reciprocal, root};
 use crate::twin::crowd_layers::sampled;
 use crate::twin::crowd_times::position_at;
 use crate::twin::quaternion::rotated;
@@ -70,10 +72,10 @@ pub struct MotionStates<'a> {
 /// ```
 #[derive(Debug, Clone)]
 pub struct MotionTables {
-    clips: Vec<CrowdClip>,
-    bases: Vec<CrowdBase>,
-    channels: Vec<CrowdChannel>,
-    links: Vec<CrowdLink>,
+    pub(super) clips: Vec<CrowdClip>,
+    pub(super) bases: Vec<CrowdBase>,
+    pub(super) channels: Vec<CrowdChannel>,
+    pub(super) links: Vec<CrowdLink>,
     runs: Vec<Vec<Range<u32>>>,
     joints: usize,
     ticks_per_second: u32,
@@ -199,14 +201,15 @@ impl MotionTables {
                     && !keeps_keys(form)
                     && base_spans.iter().any(|span| span.start & ON_KEY != 0);
                 let keys = channel.keys as usize + last;
-                let is_of_kernels =
-                    [FORM_CONSTANT, FORM_ARC, FORM_CUBIC, FORM_POLYNOMIAL].contains(&form);
-                // Rotations are on arcs, translations and scales on lines.
-                let is_of_keys = match index_of_kind {
-                    0 => form == FORM_KEYS || form == FORM_PACKED,
-                    _ => form == FORM_LINE,
+                // Constants of another form would be read beyond their end.
+                let is_of_kind = match index_of_kind {
+                    0 => matches!(
+                        form,
+                        FORM_CONSTANT | FORM_ARC | FORM_POLYNOMIAL | FORM_KEYS | FORM_PACKED
+                    ),
+                    _ => matches!(form, FORM_CONSTANT | FORM_CUBIC | FORM_LINE),
                 };
-                (is_of_kernels || is_of_keys) && end < cells && (!has_keys || keys < cells)
+                is_of_kind && end < cells && (!has_keys || keys < cells)
             };
             let channels = &self.channels[index * each..][..each];
             clip.bases > 0 && clip.period > 0 && channels.iter().enumerate().all(is_sound_channel)
@@ -256,10 +259,22 @@ impl MotionTables {
         self.clips.get(clip).map(|clip| clip.period)
     }
 
+    /// Refuses spans and cells that do not belong to the tables.
+    pub(super) fn check_parts(
+        &self,
+        (spans, cells): (&[[u32; 4]], &[[f32; 4]]),
+    ) -> Result<(), CrowdError> {
+        match (spans.len(), cells.len()) == self.sizes {
+            true => Ok(()),
+            false => Err(CrowdError::BrokenTables),
+        }
+    }
+
     /// Computes the states of instances. `at` has a clip and a tick for each instance; ticks after the clip's end
     /// give its last pose. The spans and cells are those that belong to the tables.
     ///
-    /// `engine` provides the threads and the vector width. The host computes for every device.
+    /// `engine` provides the threads and the vector width. The host computes for every device; with the feature
+    /// `vulkan`, a `DeviceMotions` has the tables on a device, which computes there.
     ///
     /// # Errors
     /// When a clip does not exist, an array is neither empty nor as long as the instances times the joints, the spans
@@ -287,13 +302,8 @@ impl MotionTables {
         steps: &[FrameStep],
         states: MotionStates<'_>,
     ) -> Result<(), CrowdError> {
-        match steps.len() == at.len() {
-            true => self.states_into(engine, parts, (at, Some(steps)), states),
-            false => Err(CrowdError::OutputLength {
-                length: steps.len(),
-                needed: at.len(),
-            }),
-        }
+        check_steps(steps.len(), at.len())?;
+        self.states_into(engine, parts, (at, Some(steps)), states)
     }
 
     fn states_into(
@@ -303,18 +313,8 @@ impl MotionTables {
         (at, steps): (&[(u32, u32)], Option<&[FrameStep]>),
         states: MotionStates<'_>,
     ) -> Result<(), CrowdError> {
-        if (spans.len(), cells.len()) != self.sizes {
-            return Err(CrowdError::BrokenTables);
-        }
-        let count = self.clips.len();
-        if let Some(&(clip, _)) = at.iter().find(|(clip, _)| *clip as usize >= count) {
-            let (subject, index) = ("clip", clip as usize);
-            return Err(CrowdError::Missing {
-                subject,
-                index,
-                count,
-            });
-        }
+        self.check_parts((spans, cells))?;
+        check_clips(self.clips.len(), at)?;
         let needed = at.len() * self.joints;
         let lengths = [
             states.rotations.len(),
@@ -362,6 +362,26 @@ impl MotionTables {
     }
 }
 
+/// Refuses more or fewer steps than instances.
+pub(super) fn check_steps(length: usize, needed: usize) -> Result<(), CrowdError> {
+    match length == needed {
+        true => Ok(()),
+        false => Err(CrowdError::OutputLength { length, needed }),
+    }
+}
+
+/// Refuses instances of clips that do not exist.
+pub(super) fn check_clips(count: usize, at: &[(u32, u32)]) -> Result<(), CrowdError> {
+    match at.iter().find(|(clip, _)| *clip as usize >= count) {
+        None => Ok(()),
+        Some(&(clip, _)) => Err(CrowdError::Missing {
+            subject: "clip",
+            index: clip as usize,
+            count,
+        }),
+    }
+}
+
 /// The two ticks between which an instance's velocities are differences, and one divided by the seconds between them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FrameStep {
@@ -400,6 +420,8 @@ struct StateScratch {
 /// Scratch memory for one pose.
 #[derive(Default)]
 struct PoseScratch {
+    /// The clip of the previous pose, and the positions of its time bases.
+    clip: Option<u32>,
     positions: Vec<CrowdPosition>,
     /// The keys at the start and at the end of the span of each joint.
     keys: [Vec<[f32; 4]>; 2],
@@ -535,9 +557,20 @@ impl Poses<'_> {
         let tick = tick.min(clip_entry.period);
         let bases = &tables.bases[clip_entry.first_base as usize..][..clip_entry.bases as usize];
         let positions = &mut scratch.positions;
-        positions.clear();
-        let position = |base| guessed_position(base, spans, tick, clip_entry.period);
-        positions.extend(bases.iter().map(position));
+        if scratch.clip != Some(clip) {
+            scratch.clip = Some(clip);
+            positions.clear();
+            // As if keys were at even times.
+            positions.extend(bases.iter().map(|base| CrowdPosition {
+                span: spans_in(base, tick.into(), clip_entry.period) as u32,
+                parameter: 0.0,
+            }));
+        }
+        // The previous pose of a clip is often a frame away: of a window, or an end of a step.
+        for (base, position) in bases.iter().zip(&mut *positions) {
+            let guess = position.span & TICKS;
+            *position = guessed_position(base, spans, (tick, clip_entry.period), guess);
+        }
         let each = tables.joints * CHANNELS as usize;
         let channels = &tables.channels[clip as usize * each..][..each];
         let moment = ClipMoment {
@@ -618,37 +651,40 @@ impl Joint {
         let [x, y, z] = before.position.map(|coordinate| -coordinate);
         self.velocity = scaled(sum(after.position, [x, y, z]), per_second).map(canonical);
         let [x, y, z, w] = before.rotation;
-        let [x, y, z, w] = product(after.rotation, [-x, -y, -z, w]);
-        let sine = (x * x + y * y + z * z).sqrt();
-        // The shorter arc; the limit if the angle is 0.
-        let angle = 2.0 * arc_tangent(sine, w.abs());
-        let scale = if sine > 0.0 { angle / sine } else { 2.0 };
+        let [x, y, z, w] = product(after.rotation, [-x, -y, -z, w]).map(flushed);
+        let sine = root(x * x + y * y + z * z);
+        // The shorter arc, by the rotation vector's length; 0 if the angle is.
+        let scale = match sine == 0.0 {
+            true => 0.0,
+            false => 2.0 * arc_tangent(sine, w.abs()) * reciprocal(sine),
+        };
         let scale = if w < 0.0 { -scale } else { scale };
         self.angular_velocity = scaled([x, y, z], scale * per_second).map(canonical);
     }
 }
 
+/// The spans of a time base in so many ticks if keys are at even times, rounded towards 0.
+#[inline(always)]
+fn spans_in(base: &CrowdBase, ticks: i64, period: u32) -> i64 {
+    let count = i64::from(base.count);
+    (ticks * (count - 1) / i64::from(period).max(1)).min(count - 1)
+}
+
 /// The position of a tick in a time base, as [`position_at`] computes it. Most keys are at even times, or intervals are
-/// divided about evenly. Therefore the span that would contain the tick at even times is tried first, and then those to
-/// which the distance from it points. A search from the ends would wait for memory at each step.
+/// divided about evenly. Therefore a guessed span is tried first, and then those to which the distance from it points. A
+/// search from the ends would wait for memory at each step.
 #[inline(always)]
 fn guessed_position(
     base: &CrowdBase,
     spans: &[CrowdSpan],
-    tick: u32,
-    period: u32,
+    (tick, period): (u32, u32),
+    guess: u32,
 ) -> CrowdPosition {
     let count = i64::from(base.count);
     let base_spans = &spans[base.first as usize..][..base.count as usize];
     let start = |index: i64| i64::from(base_spans[index as usize].start & TICKS);
-    // The number of spans in this many ticks, rounded away from 0.
-    let spans_in = |ticks: i64| {
-        let product = ticks * (count - 1);
-        let period = i64::from(period).max(1);
-        (product + product.signum() * (period - 1)) / period
-    };
     let tick_number = i64::from(tick);
-    let mut index = (tick_number * (count - 1) / i64::from(period).max(1)).min(count - 1);
+    let mut index = i64::from(guess).min(count - 1);
     for _ in 0..GUESSES {
         let distance = tick_number - start(index);
         let is_before_next = index + 1 == count || tick_number < start(index + 1);
@@ -662,9 +698,10 @@ fn guessed_position(
             let span = position.span + index as u32;
             return CrowdPosition { span, ..position };
         }
+        // At least one span on.
         index = match distance < 0 {
-            true => (index + spans_in(distance)).max(0),
-            false => (index + spans_in(distance)).min(count - 1),
+            true => (index + spans_in(base, distance, period) - 1).max(0),
+            false => (index + spans_in(base, distance, period).max(1)).min(count - 1),
         };
     }
     position_at(base, spans, tick)

@@ -11,7 +11,6 @@ use crate::gpu::buffer::{Buffer, Residence};
 use crate::gpu::engine::VulkanEngine;
 use crate::gpu::in_flight::KernelResults;
 use crate::gpu::physical::DeviceKind;
-use crate::gpu::pipeline::Pipeline;
 use crate::gpu::recorded::{Binding, Commands, Recorded};
 use crate::machine::crowd::{CrowdFrame, EntryChanges, VisibleInstances};
 use crate::machine::crowd::{CrowdSource, MachineCrowd};
@@ -140,7 +139,7 @@ impl DeviceCrowd {
         let properties = CrowdDevice {
             maps_samples: self.engine.maps_samples,
             subgroup_lanes: device.physical.subgroup_lanes,
-            runs: &|kernel| Pipeline::can_run(device, kernel),
+            runs: &|kernel| self.engine.uses(kernel),
         };
         FrameKernels::new(&self.tables.shape, output, &properties)
     }
@@ -446,6 +445,43 @@ mod tests {
             let found = kernels(&crowd, Rotations.into());
             assert_eq!(found, ["crowd_whole_rotations"]);
         }
+    }
+
+    /// A driver compiles it wrongly: the kernel with the memory of workgroups takes its place, and the report says so.
+    #[test]
+    fn a_kernel_by_subgroups_that_differs_is_replaced() {
+        use crate::gpu::pipeline::faults::MISCOMPILED;
+        let kernel = Kernel::CrowdSubgroupRotations;
+        let output = CrowdOutput::from(CrowdValues::Rotations);
+        MISCOMPILED.set(Some(kernel));
+        for mut crowd in crowd(Mapping::Samples, 128, 1, false) {
+            let on_device = VulkanCrowd::of(&**crowd.device.as_ref().unwrap()).unwrap();
+            let engine = Arc::clone(&on_device.device.engine);
+            if engine.device.physical.subgroup_lanes.is_none() {
+                continue;
+            }
+            let of_workgroups = ["crowd_plain_whole_rotations"];
+            assert_eq!(kernels(&crowd, output), of_workgroups);
+            let known = engine.known_kernels();
+            let replaced = Vec::from_iter(known.iter().filter(|check| check.replaced));
+            let [check] = &replaced[..] else {
+                panic!("{replaced:?}");
+            };
+            assert_eq!(check.name, "crowd_subgroup_rotations");
+            assert!(check.differing > 0 && check.differing <= check.total);
+            let mut rotations = vec![[0.0; 4]; crowd.output_len(output)];
+            crowd
+                .evaluate_into(CrowdValues::Rotations, &mut rotations)
+                .unwrap();
+            let cpu = Engine::new(Device::Cpu).unwrap();
+            let mut on_cpu = cpu.crowd(crowd.library(), 1, 1).unwrap();
+            let mut expected = vec![[0.0; 4]; rotations.len()];
+            on_cpu
+                .evaluate_into(CrowdValues::Rotations, &mut expected)
+                .unwrap();
+            assert_eq!(rotations, expected);
+        }
+        MISCOMPILED.set(None);
     }
 
     #[test]

@@ -309,7 +309,7 @@ impl KernelResults {
 }
 
 /// A kept buffer of at least `size` bytes; a shorter one is replaced.
-fn grow<'b>(
+pub(crate) fn grow<'b>(
     device: &Arc<LogicalDevice>,
     kept: &'b mut Option<Buffer>,
     size: u64,

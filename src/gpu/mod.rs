@@ -31,14 +31,14 @@
 //!    rotations that the host computed in f64 because no polynomial fits their curve.
 //!
 //! Sets with fewer samples than keys are evaluated by [`engine::from_keys`] without segments. Crowds have separate
-//! tables and targets ([`crowd`]). A [`ClipTarget`](clip::ClipTarget) records a clip into an application's commands;
+//! tables and targets ([`crowd`]), and so have states of motion libraries ([`motion`]). A [`ClipTarget`](clip::ClipTarget) records a clip into an application's commands;
 //! [`passes`] runs passes over poses, or records them from buffer to buffer.
 //!
 //! # Memory
 //!
 //! | what | memory |
 //! |---|---|
-//! | segments, constants, tables of crowds | device memory |
+//! | segments, constants, tables of crowds and of motion libraries | device memory |
 //! | lists and keys | device memory if the host can write it ([`UploadMemory`](physical::upload_memory::UploadMemory)), else copied to it, or read in host memory |
 //! | results | where the host reads them on devices that share its memory, and in the caller's memory on software devices ([`external`]); else device memory, copied by the second queue beside later kernels |
 //! | results for CUDA | device memory, exported as a file descriptor ([`external`]) |
@@ -63,6 +63,7 @@ pub(crate) mod instance;
 pub(crate) mod job;
 pub(crate) mod kernel_check;
 mod machine;
+pub(crate) mod motion;
 pub(crate) mod opened;
 pub(crate) mod passes;
 pub(crate) mod physical;

@@ -170,9 +170,9 @@ with_fields! {
     with_cache_files(cache_files: CacheFiles),
 }
 
-/// How many neighbouring invocations of a graphics card evaluate a run of samples together, for runs of each class of
-/// lengths ([`RunLanes::CLASSES`]). Only powers of two from 4 to 32 are used: other numbers are as the next smaller one,
-/// or the nearest of these.
+/// How many neighbouring invocations of a graphics card evaluate a run of samples together, track by track, for runs of
+/// each class of lengths ([`RunLanes::CLASSES`]). Only powers of two from 4 to 32 are used: other numbers are as the next
+/// smaller one, or the nearest of these.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct RunLanes(pub [u32; 5]);

@@ -108,4 +108,6 @@ pub struct KernelCheck {
     pub differing: usize,
     /// Whether nothing was compared now, because the kernel is known to have passed on this device.
     pub remembered: bool,
+    /// Whether it differs, and the engine evaluates with other kernels in its place, which have the CPU's bits.
+    pub replaced: bool,
 }

@@ -3,7 +3,8 @@
 //! 754, so that every machine and every vector width gives the same bits.
 //!
 //! Quaternions are plain arrays, `x y z w`: glam's types would keep such a loop scalar. Functions
-//! that are generic over [`Real`] also take vectors of f64.
+//! that are generic over [`Real`] also take vectors of f64. The products of vectors of `shaders/math/vector.wgsl` are
+//! here, too: f64 shares them.
 
 use std::f64::consts::{FRAC_2_PI, PI, TAU};
 use std::ops::{Add, Div, Mul, Neg, Sub};

@@ -11,5 +11,7 @@ pub(crate) mod pose_error;
 pub(crate) mod rotations;
 pub(crate) mod scalars;
 pub(crate) mod signs;
+#[cfg(feature = "vulkan")]
+pub(crate) mod states;
 pub(crate) mod value;
 pub(crate) mod window;

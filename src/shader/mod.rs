@@ -78,6 +78,11 @@ impl Kernel {
         &KERNELS[self as usize]
     }
 
+    /// Whether others evaluate the same where a device cannot run this one, or where its bits differ from the CPU's.
+    pub(crate) fn is_replaceable(self) -> bool {
+        self.compiled().subgroups
+    }
+
     /// The name, the code, and whether the code reads texel buffers: it does if this is requested and the kernel has
     /// such a variant.
     pub(crate) fn code(self, variants: Variants) -> (&'static str, &'static [u32], bool) {

@@ -1,5 +1,5 @@
-//! Twin of `shaders/crowd/cubic.wgsl`, `shaders/crowd/sampled.wgsl`, `shaders/crowd/layers.wgsl`,
-//! `shaders/crowd/plain.wgsl`, `shaders/crowd/plain_arc.wgsl` and `shaders/crowd/rotations.wgsl`: the same names, the
+//! Twin of `shaders/crowd/cubic.wgsl`, `shaders/crowd/sampled.wgsl`, `shaders/crowd/layer_value.wgsl`,
+//! `shaders/crowd/layers.wgsl`, `shaders/crowd/plain.wgsl`, `shaders/crowd/plain_arc.wgsl` and `shaders/crowd/rotations.wgsl`: the same names, the
 //! same order.
 
 use glam::Vec4;

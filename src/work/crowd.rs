@@ -45,7 +45,7 @@ pub(crate) struct CrowdDevice<'a> {
     pub(crate) maps_samples: bool,
     /// The lanes of its subgroups, if they can do all that kernels need.
     pub(crate) subgroup_lanes: Option<u32>,
-    /// Whether the device can run a kernel.
+    /// Whether the device can run a kernel, and gives the CPU's bits with it.
     pub(crate) runs: &'a dyn Fn(Kernel) -> bool,
 }
 

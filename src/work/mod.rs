@@ -2,6 +2,7 @@
 
 pub(crate) mod crowd;
 pub(crate) mod lists;
+pub(crate) mod motion;
 pub(crate) mod recording;
 pub(crate) mod subgroup_instances;
 pub(crate) mod whole_instances;

@@ -13,7 +13,7 @@ use tumble::{
     Device, Engine, EngineOptions, Method, TrackSet, VectorMethod, VectorWidth, WrapMode, method,
 };
 
-const TICKS: u32 = 705_600;
+pub(super) const TICKS: u32 = 705_600;
 
 /// Clips without scales, of which states say nothing.
 fn library(random: &mut Random, joints: usize, method: Method) -> CrowdLibrary {
@@ -26,7 +26,7 @@ fn library(random: &mut Random, joints: usize, method: Method) -> CrowdLibrary {
     library
 }
 
-fn sets(random: &mut Random, joints: usize) -> Vec<TrackSet> {
+pub(super) fn sets(random: &mut Random, joints: usize) -> Vec<TrackSet> {
     let mut sets = Vec::new();
     for keys in [1, 2, 40] {
         let tracks = clip(random, joints, keys);
@@ -49,15 +49,15 @@ fn sets(random: &mut Random, joints: usize) -> Vec<TrackSet> {
     sets
 }
 
-struct StateResults {
-    rotations: Vec<[f32; 4]>,
-    positions: Vec<[f32; 3]>,
-    world_rotations: Vec<[f32; 4]>,
-    velocities: Vec<[f32; 3]>,
-    angular_velocities: Vec<[f32; 3]>,
+pub(super) struct StateResults {
+    pub(super) rotations: Vec<[f32; 4]>,
+    pub(super) positions: Vec<[f32; 3]>,
+    pub(super) world_rotations: Vec<[f32; 4]>,
+    pub(super) velocities: Vec<[f32; 3]>,
+    pub(super) angular_velocities: Vec<[f32; 3]>,
 }
 
-fn states(
+pub(super) fn states(
     engine: &Engine,
     tables: &MotionTables,
     parts: (&[[u32; 4]], &[[f32; 4]]),
@@ -83,7 +83,11 @@ fn states(
 }
 
 /// Instances in every clip, within it, at its ends and behind.
-fn instances(random: &mut Random, tables: &MotionTables, count: usize) -> Vec<(u32, u32)> {
+pub(super) fn instances(
+    random: &mut Random,
+    tables: &MotionTables,
+    count: usize,
+) -> Vec<(u32, u32)> {
     let one = |i: usize| {
         let clip = i % tables.clip_count();
         let ticks = tables.ticks(clip).unwrap();

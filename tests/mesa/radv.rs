@@ -1,18 +1,19 @@
 //! AMD's real compiler over every kernel, for six families of processors, none of which need be there:
 //! with `RADV_FORCE_FAMILY` set, Mesa's RADV makes a device that cannot compute, and
-//! compiles for it. Its listing is read, and every instruction on floats must round as the shader
-//! says.
+//! compiles for it. Since Mesa 26.2 a layer that stands in for the kernel's driver does this, with `AMDGPU_GPU_ID`.
+//! The listing is read, and every instruction on floats must round as the shader says.
 //!
-//! The system's RADV and a newer one are asked. Catches a driver that fuses in spite of the
+//! The system's RADV and a newer one are asked, and the newest one where it is unpacked. Catches a driver that fuses in spite of the
 //! decorations, a kernel that lacks one, spilled registers, and a kernel that got dearer.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::process::Command;
 
 use super::compile::{divisions, listings, this_program};
 use super::listing::{Generation, Listing};
 use super::table::{self, Cost};
-use super::{newer, with_driver};
+use super::{Driver, newer, unpacked_if_there, with_driver};
 use crate::support::is_due;
 use rayon::prelude::*;
 
@@ -65,6 +66,22 @@ fn system() -> Option<PathBuf> {
     found
 }
 
+/// The Mesa whose RADV makes a device of its own for a family no more, major and minor.
+const BY_LAYER: (u32, u32) = (26, 2);
+
+/// This program with a driver that compiles for a family.
+fn program(manifest: &Path, family: &str) -> Command {
+    let driver = Driver::of(manifest);
+    if driver.version < BY_LAYER {
+        let mut program = this_program();
+        with_driver(&mut program, manifest).env("RADV_FORCE_FAMILY", family);
+        return program;
+    }
+    let mut program = driver.this_program("libamdgpu_noop_drm_shim.so");
+    with_driver(&mut program, manifest).env("AMDGPU_GPU_ID", family);
+    program
+}
+
 /// The listings of kernels as a driver compiles them for a family (all kernels where none is named).
 fn compiled(
     manifest: &Path,
@@ -72,14 +89,9 @@ fn compiled(
     kernels: &[&str],
     is_bare: bool,
 ) -> Vec<(String, Listing)> {
-    let which = if manifest.starts_with("/usr") {
-        "system"
-    } else {
-        "newer"
-    };
-    let label = format!("{which}-{family}-{}", kernels.len());
-    let mut program = this_program();
-    with_driver(&mut program, manifest).env("RADV_FORCE_FAMILY", family);
+    let (major, minor) = Driver::of(manifest).version;
+    let label = format!("{major}.{minor}-{family}-{}", kernels.len());
+    let mut program = program(manifest, family);
     let texts = listings(&mut program, &label, kernels, is_bare).into_iter();
     texts
         .map(|(name, text)| (name, Listing::read(&text)))
@@ -124,8 +136,13 @@ fn every_kernel_is_exact_on_families_in_turn() {
     let older_families = FAMILIES
         .iter()
         .map(|family| (family, family.older, &system));
+    let newest = unpacked_if_there("newest/radeon_icd.json");
+    let newest_families = FAMILIES
+        .iter()
+        .map(|family| (family, Some(family.name), &newest));
     let asked: Vec<(&Family, &str, &Path)> = newer_families
         .chain(older_families)
+        .chain(newest_families)
         .filter_map(|(family, name, manifest)| Some((family, name?, manifest.as_deref()?)))
         .collect();
     let in_table = table::kernels(TABLE);
@@ -174,7 +191,8 @@ fn without_the_pass_products_and_sums_are_fused() {
     let kernels = ["arc_frames_f32", "polynomial_frames_f32"];
     let newer = newer("radeon").map(|manifest| (manifest, "gfx1201"));
     let system = system().map(|manifest| (manifest, "navi21"));
-    for (manifest, family) in newer.into_iter().chain(system) {
+    let newest = unpacked_if_there("newest/radeon_icd.json").map(|manifest| (manifest, "gfx1201"));
+    for (manifest, family) in newer.into_iter().chain(system).chain(newest) {
         for (kernel, listing) in compiled(&manifest, family, &kernels, true) {
             let fused = listing.inexact(Generation::Rdna);
             let is_fused = |line: &&&str| line.contains("_fma");

@@ -3,6 +3,7 @@
 
 use std::fmt::Debug;
 
+use crate::crowd::clip_keys::{line_between, unpacked};
 use crate::fit::constant_velocity::arc_component;
 use crate::gpu::kernel_check::random::Random;
 use crate::math::quaternion::{cross3, dot, dot3, product};
@@ -238,6 +239,14 @@ fn keys(random: &mut Random) -> [[f32; 4]; 4] {
     }
 }
 
+/// A number up to 1 of which the root is taken, or one whose root is nearly half way between two numbers.
+fn square(random: &mut Random) -> f32 {
+    match random.once_in(8) {
+        true => f32::from_bits((127 - 2 * random.below(12) << 23) + random.below(4) - 1),
+        false => ((random.word() >> 8) + 1) as f32 / (1 << 24) as f32,
+    }
+}
+
 /// A number near the largest half, or any.
 fn large(random: &mut Random) -> f32 {
     match random.once_in(4) {
@@ -323,6 +332,8 @@ functions! { on, r:
     "reciprocal" of r.positive() => |x| entries::reciprocal(on, x), cpu::reciprocal(x);
     "reciprocal_root" of r.positive() => |x| entries::reciprocal_root(on, x), cpu::reciprocal_root(x);
     "root" of r.positive() => |x| entries::root(on, x), root(x);
+    "acute_arc_tangent" of (r.positive(), r.positive()) => |(y, x)|
+        entries::acute_arc_tangent(on, y, x), cpu::acute_arc_tangent(y, x);
     "arc_tangent" of (r.finite(), r.finite()) => |(y, x)| entries::arc_tangent(on, y, x), arc_tangent(y, x);
     "sine_cosine" of angle(r) => |x| entries::sine_cosine(on, x), <[f32; 2]>::from(cpu::sine_cosine(x));
     "sine_cosm1" of (angle(r), r.positive()) => |(x, z)|
@@ -403,6 +414,11 @@ functions! { on, r:
         [(); 3].map(|()| r.rotation()), between(r)) => |((kind, is_additive), [below, layer, reference], weight)|
         entries::laid_over(on, kind, is_additive, below, layer, reference, weight),
         cpu::laid_over(kind, is_additive, below, layer, reference, weight);
+    "exact_root" of square(r) => |x| entries::exact_root(on, x), x.sqrt();
+    "unpacked" of [r.word(), r.word()] => |key| entries::unpacked(on, key), unpacked(key);
+    "line_between" of two(r) => |(start, end)|
+        { let line = entries::line_between(on, start, end); [line.value, line.slope] },
+        line_between(start, end);
     "wide_difference" of wholes(r) => |(a, b)| entries::wide_difference(on, a, b), words(a.wrapping_sub(b));
     "move_of" of (whole(r, 23) as u32, whole(r, 40)) => |(speed, time)|
         { let moved = entries::move_of(on, speed, time); [moved.ticks[0], moved.ticks[1], moved.part] },

@@ -571,7 +571,8 @@ fn assert_is_the_cpus(
 // ---------------------------------------------------------------- the tests
 
 /// Stores touch at most 1.1 times as many lines as they need, those of runs, which end anywhere, 1.2 times as many
-/// of 128 bytes; and loads 1.3 times, frame by frame 1.4 times.
+/// of 128 bytes; and loads 1.3 times, frame by frame 1.4 times. Frame by frame, stores of tracks that do not fill whole
+/// lines begin anywhere, and touch 1.25 times as many lines of 128 bytes.
 #[test]
 fn cards_touch_hardly_more_lines_than_they_need() {
     let layouts = [Layout::TrackMajor, Layout::FrameMajor];
@@ -584,8 +585,15 @@ fn cards_touch_hardly_more_lines_than_they_need() {
             ("scattered", scattered(24)),
             // As many tracks as fill no whole lines, frame by frame.
             ("odd", sparse(509)),
+            // Tracks with the same times.
+            ("even", even(96, 48, GENTLE)),
+            ("odd and even", even(141, 48, GENTLE)),
         ] {
-            let mut launches = Vec::from(layouts.map(|layout| {
+            let layouts = match name.contains("even") {
+                true => &layouts[1..],
+                false => &layouts,
+            };
+            let mut launches = Vec::from_iter(layouts.iter().map(|&layout| {
                 let launch = of_clip(&set, &frames, method, layout, true);
                 (format!("{name}, {method}, {layout:?}"), launch, layout)
             }));
@@ -595,20 +603,29 @@ fn cards_touch_hardly_more_lines_than_they_need() {
             }
             for (name, launch, layout) in &launches {
                 assert_touches_hardly_more_lines(name, launch);
-                if !name.starts_with("odd") {
+                if *layout == Layout::FrameMajor {
+                    let has_same_times = ["even", "dense"].iter().any(|part| name.contains(part));
+                    assert_eq!(is_spread(launch.kernel), has_same_times, "{name}");
+                }
+                if !name.starts_with("odd,") {
                     assert_is_the_cpus(launch, (&set, &frames), method, *layout);
                 }
             }
             count_of_launches += launches.len();
         }
     }
-    assert_eq!(count_of_launches, 2 * (5 * 2 + 2));
+    assert_eq!(count_of_launches, 2 * (5 * 2 + 2 + 2));
+}
+
+/// Whether neighbouring invocations of a kernel evaluate runs together.
+fn is_spread(kernel: Kernel) -> bool {
+    let segments = kernel.compiled().segments;
+    segments.is_some_and(|(_, list, _)| matches!(list, List::FramesSpread | List::TimesSpread))
 }
 
 fn assert_touches_hardly_more_lines(name: &str, launch: &Launch) {
     let count = launch.run();
-    let is_spread = (launch.kernel.compiled().segments)
-        .is_some_and(|(_, list, _)| matches!(list, List::FramesSpread | List::TimesSpread));
+    let is_spread = is_spread(launch.kernel);
     let mut ratios = String::new();
     for ((wave, line), [stores, loads]) in CARDS.into_iter().zip(count.of_cards) {
         let (stored, loaded) = (stores.ratio(), loads.ratio());
@@ -616,6 +633,7 @@ fn assert_touches_hardly_more_lines(name: &str, launch: &Launch) {
         let label = format!("{name}, {wave} lanes, lines of {line}");
         // Where a run ends within a line, the next one stores the rest of it, in another wave.
         let limit = match (is_spread, line) {
+            (true, 128) if name.starts_with("odd") && name.ends_with("FrameMajor") => 1.25,
             (true, 128) => 1.2,
             _ => 1.1,
         };
@@ -659,37 +677,64 @@ fn an_item_for_each_invocation_touches_more_lines() {
     }
 }
 
+/// The largest angle in R⁴ between the keys of tracks of which some cubics are divided, and of tracks of which none is.
+const WILD: f64 = 1.0;
+const GENTLE: f64 = 0.1;
+
 /// Tracks whose keys lie a number of frames apart, each on a frame.
-fn even(tracks: usize, step: usize) -> (TrackSet, SampleTimes) {
+fn even(tracks: usize, step: usize, angle: f64) -> (TrackSet, SampleTimes) {
     let (mut random, mut set) = (Rng::with_seed(5), TrackSet::new());
     let keys = 960 / step + 1;
     let times: Vec<f64> = (0..keys).map(|key| (key * step) as f64 / 60.0).collect();
     for _ in 0..tracks {
-        set.push("", &times, &walk(&mut random, keys, 1.0)).unwrap();
+        set.push("", &times, &walk(&mut random, keys, angle))
+            .unwrap();
     }
     let last = ((keys - 1) * step) as f64;
     (set, SampleTimes::fps(60).between(0.0, last / 60.0))
 }
 
+/// As many tracks, one of which has other times, so that the tracks have separate lists.
+fn uneven(tracks: usize, step: usize, angle: f64) -> (TrackSet, SampleTimes) {
+    let (mut set, frames) = even(tracks - 1, step, angle);
+    let keys = walk(&mut Rng::with_seed(6), 2, angle);
+    set.push("", &[0.0, 16.0], &keys).unwrap();
+    (set, frames)
+}
+
 /// The operations of a wave for a rotation, of arcs and of cubics, for runs of some lengths: at most a fiftieth more than
-/// counted.
+/// counted. Frame by frame, tracks with other times have a grid.
 #[test]
 fn a_wave_executes_few_operations_for_a_rotation() {
-    for (step, counted) in [
-        (8, [95.2, 109.5]),
-        (16, [68.1, 75.8]),
-        (48, [60.2, 66.2]),
-        (192, [47.1, 49.9]),
-    ] {
+    type Workload = fn(usize, usize, f64) -> (TrackSet, SampleTimes);
+    let (by_track, by_frame) = ((Layout::TrackMajor, WILD), (Layout::FrameMajor, GENTLE));
+    let workloads: [(Workload, usize, (Layout, f64), usize, [f64; 2]); 8] = [
+        (even, 40, by_track, 8, [95.2, 109.5]),
+        (even, 40, by_track, 16, [68.1, 75.8]),
+        (even, 40, by_track, 48, [60.2, 66.2]),
+        (even, 40, by_track, 192, [47.1, 49.9]),
+        (even, 64, by_frame, 8, [45.3, 49.4]),
+        (even, 64, by_frame, 48, [48.0, 52.3]),
+        (uneven, 64, by_frame, 8, [118.0, 110.0]),
+        (uneven, 64, by_frame, 48, [123.0, 114.0]),
+    ];
+    let mut wrong = Vec::new();
+    for (workload, tracks, (layout, angle), step, counted) in workloads {
         for (method, counted) in [SLERP, BESSEL_OVERHAUSER].into_iter().zip(counted) {
-            let (set, frames) = even(40, step);
-            let launch = of_clip(&set, &frames, method, Layout::TrackMajor, true);
+            let (set, frames) = workload(tracks, step, angle);
+            let launch = of_clip(&set, &frames, method, layout, true);
             let count = launch.run();
             let each = 4.0 * 32.0 * count.steps[0] as f64 / count.words as f64;
-            let label = format!("{method}, runs of {step}: {each:.1} operations");
+            let label = format!(
+                "{method}, {layout:?}, {:?}, runs of {step}: {each:.1} operations",
+                launch.kernel
+            );
             println!("{label}");
-            assert!((0.9 * counted..1.02 * counted).contains(&each), "{label}");
-            assert_is_the_cpus(&launch, (&set, &frames), method, Layout::TrackMajor);
+            if !(0.9 * counted..1.02 * counted).contains(&each) {
+                wrong.push(label);
+            }
+            assert_is_the_cpus(&launch, (&set, &frames), method, layout);
         }
     }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }

@@ -109,9 +109,14 @@ const SLIGHT: f32 = 1.001;
 /// Mistakes that change no bit of a result: the function, the beginning of the text, the factor of a constant that does
 /// change one, and why.
 const WITHOUT_EFFECT: [(&str, &str, Option<f32>, &str); 4] = [
-    ("arc_tangent", "M::F::of(1.0)", None, "the divisor of 0"),
     (
-        "arc_tangent",
+        "acute_arc_tangent",
+        "M::F::of(1.0)",
+        None,
+        "the divisor of 0",
+    ),
+    (
+        "acute_arc_tangent",
         "M::F::of(HALF_PI_LOW)",
         Some(0.5),
         "less than a rounding of the sum",

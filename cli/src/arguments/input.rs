@@ -831,11 +831,24 @@ fn read_list(list: &Path, is_null_separated: bool) -> Result<Vec<PathBuf>, Failu
         let paths = text.split(|&byte| byte == 0);
         return Ok(paths.filter(|path| !path.is_empty()).map(named).collect());
     }
+    // Editors of Windows begin a file with a byte-order mark.
+    let text = text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&text);
     let lines = text
         .split(|&byte| byte == b'\n')
         .map(<[u8]>::trim_ascii_end);
-    let paths = lines.filter(|line| !line.is_empty() && !line.starts_with(b"#"));
-    Ok(paths.map(named).collect())
+    let lines = lines.filter(|line| !line.is_empty());
+    let (comments, paths): (Vec<&[u8]>, Vec<&[u8]>) =
+        lines.partition(|line| line.starts_with(b"#"));
+    // `ls` prints the names of files that begin so, too.
+    let files = comments.iter().filter(|line| named(line).exists()).count();
+    if files > 0 {
+        let lines = words::count(files, "line");
+        words::warning(&format!(
+            "{}: {lines} that begin with `#` are comments, though files of these names exist; write ./#… for them",
+            names::input(list)
+        ));
+    }
+    Ok(paths.into_iter().map(named).collect())
 }
 
 /// The path of these bytes: names of files need be not UTF-8.

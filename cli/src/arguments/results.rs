@@ -368,14 +368,13 @@ pub(crate) fn document_to_rewrite<'a>(
 /// Refuses to write a file again of which some animations were refused: they would stay in it, and programs that read
 /// it may refuse the whole file.
 pub(crate) fn check_whole(work: &ClipWork) -> Result<(), Failure> {
-    let Some(refused) = work.input.loaded.refused.first() else {
+    if work.input.loaded.refused.is_empty() {
         return Ok(());
-    };
+    }
     Err(Failure::new(
         ALL_INPUTS,
         format!(
-            "{}: the result would keep the animation that cannot be read; mend or remove it, or write another format \
-             (the error: {refused})",
+            "{}: the result would keep the animation that cannot be read; mend or remove it, or write another format",
             work.name
         ),
     ))

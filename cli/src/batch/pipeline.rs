@@ -607,7 +607,17 @@ impl<'a> Pipeline<'a> {
         {
             match failure.code {
                 SOME_INPUTS => batch.done_in_part += 1,
-                _ => batch.failed += 1,
+                _ => {
+                    batch.failed += 1;
+                    let folder = batch.previous.folder();
+                    let earlier = result
+                        .into_iter()
+                        .flat_map(|it| batch.previous.results_of(it));
+                    let mut earlier = earlier.map(|entry| folder.join(&entry.output));
+                    if let Some(stale) = earlier.find(|path| path.exists()) {
+                        batch.summary.stay(&stale);
+                    }
+                }
             }
             recorded = batch.records.refuse(entry);
         }

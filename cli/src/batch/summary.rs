@@ -3,7 +3,9 @@
 //! manifest.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
 
+use tumble_formats::printable::printable_path;
 use tumble_formats::{Code, Diagnostic};
 
 use crate::messages::exit::Failure;
@@ -34,6 +36,8 @@ pub(crate) struct BatchSummary {
     left_out: usize,
     /// The results whose lines were left out, and which have a rate that was assumed: how many, and the first rate.
     assumed: Option<(usize, String)>,
+    /// The failed inputs that have results of an earlier run: how many, and the first of these results.
+    stale: Option<(usize, String)>,
 }
 
 /// The inputs with warnings of one code.
@@ -62,6 +66,7 @@ impl BatchSummary {
             printed: BTreeSet::new(),
             left_out: 0,
             assumed: None,
+            stale: None,
         }
     }
 
@@ -123,6 +128,12 @@ impl BatchSummary {
             });
     }
 
+    /// A failed input has a result of an earlier run, which stays.
+    pub(crate) fn stay(&mut self, result: &Path) {
+        let first = || (0, printable_path(result));
+        self.stale.get_or_insert_with(first).0 += 1;
+    }
+
     /// The lines at the end of the batch.
     pub(crate) fn lines(&self) -> Vec<String> {
         const MORE: &str = "(--verbose lists them)";
@@ -167,7 +178,12 @@ impl BatchSummary {
                 "{results} {have} {rate} fps, because the keys have no rate (--fps chooses one)"
             )
         });
-        assumed.chain(warned).chain(failed).collect()
+        let stale = self.stale.iter().map(|(count, first)| {
+            let inputs = words::count(*count, "failed input");
+            let have = if *count == 1 { "has a result" } else { "have results" };
+            format!("{inputs} {have} of an earlier run, made from other bytes, which stay: {first} is the first")
+        });
+        assumed.chain(warned).chain(failed).chain(stale).collect()
     }
 
     /// Whether lines about results were left out.

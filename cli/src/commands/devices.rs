@@ -39,7 +39,7 @@ struct DeviceEntry {
     index: usize,
     #[serde(flatten)]
     info: DeviceInfo,
-    /// It opens, and no self-test and no kernel that was checked differs.
+    /// It opens, and no self-test and no kernel that it uses and that was checked differs.
     exact: bool,
     self_tests: Vec<SelfTestReport>,
     kernels: KernelSummary,
@@ -150,7 +150,7 @@ impl DeviceEntry {
         };
         let exact = error.is_none()
             && self_tests.iter().all(|check| check.differing == 0)
-            && kernels.differing.is_empty();
+            && kernels.differing.iter().all(|check| check.replaced);
         Some(Self {
             index,
             info,
@@ -195,8 +195,9 @@ impl DeviceEntry {
         }
         let self_tests =
             (self.self_tests.iter()).map(|check| (check.name, check.differing, check.total));
-        let kernels =
-            (self.kernels.differing.iter()).map(|check| (check.name, check.differing, check.total));
+        let (replaced, used): (Vec<_>, Vec<_>) =
+            (self.kernels.differing.iter()).partition(|check| check.replaced);
+        let kernels = (used.iter()).map(|check| (check.name, check.differing, check.total));
         let failed: Vec<String> = self_tests
             .chain(kernels)
             .filter(|(_, differing, _)| *differing > 0)
@@ -205,9 +206,14 @@ impl DeviceEntry {
         if failed.is_empty() {
             let results: usize = self.self_tests.iter().map(|check| check.total).sum();
             let KernelSummary { all, exact, .. } = self.kernels;
-            let kernels = match exact == all {
-                true => format!("all {all} kernels are exact"),
-                false => format!(
+            let kernels = match (exact == all, &replaced[..]) {
+                (true, _) => format!("all {all} kernels are exact"),
+                (false, [check, ..]) => format!(
+                    "{exact} of {all} kernels are exact; {} differs ({} of {}), and others are used \
+                     in its place",
+                    check.name, check.differing, check.total
+                ),
+                (false, []) => format!(
                     "{exact} of {all} kernels are known to be exact, the others are checked when \
                      they are first needed, or by --check"
                 ),

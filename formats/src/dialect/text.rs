@@ -4,7 +4,7 @@ use tumble::{FrameRate, Layout};
 
 use super::{archive_of, root};
 use crate::budget::Budget;
-use crate::diagnostic::{Code, Diagnostic};
+use crate::diagnostic::{Code, Diagnostic, Location};
 use crate::format::{Loaded, ReadOptions, TimeUnit};
 use crate::motion::ScalarKind;
 use crate::npz;
@@ -31,6 +31,9 @@ pub(super) const JOINT: &str = "_dof";
 /// The fewest columns of Unitree's files: position, quaternion, two joints.
 const FEWEST: usize = 9;
 
+/// After so many lines of a dialect, another line is a damaged one of it.
+const CERTAIN: usize = 2;
+
 /// How far from 1 the norm of a quaternion may be.
 const NORM: f64 = 1e-3;
 
@@ -54,11 +57,9 @@ pub(crate) fn read(
     let Ok(text) = std::str::from_utf8(bytes) else {
         return Ok(None);
     };
-    let mut lines = text
-        .lines()
-        .filter(|line| !line.trim().is_empty())
-        .peekable();
-    let Some(first) = lines.peek() else {
+    let lines = (1u64..).zip(text.lines());
+    let mut lines = lines.filter(|(_, line)| !line.trim().is_empty()).peekable();
+    let Some((_, first)) = lines.peek() else {
         return Ok(None);
     };
     let cells: Vec<&str> = first.split(',').map(str::trim).collect();
@@ -78,27 +79,37 @@ pub(crate) fn read(
     };
     let width = cells.len();
     let budget = Budget::of(bytes.len(), options.limits);
-    let mut numbers: Vec<f64> = Vec::new();
-    for line in lines {
-        let before = numbers.len();
-        for cell in line.split(',') {
-            let Ok(number) = cell.trim().parse() else {
-                return Ok(None);
-            };
-            numbers.push(number);
-        }
-        if numbers.len() - before != width {
-            return Ok(None);
-        }
-        let budgeted = budget.take(width, 2 * size_of::<f64>());
-        budgeted.map_err(|error| Diagnostic::new(file, Code::Memory, error.to_string()))?;
-    }
     let norm = |row: &[f64]| row[3..7].iter().map(|q| q * q).sum::<f64>().sqrt();
     // If the first number is large, it is a time, as in VINS-Mono's files.
     let is_unit =
         |row: &[f64]| (norm(row) - 1.0).abs() < NORM && TimeUnit::of_large(row[0]).is_none();
     let is_unitree = matches!(dialect, TextDialect::Unitree);
-    if numbers.is_empty() || is_unitree && !numbers.chunks_exact(width).all(is_unit) {
+    let is_known = |numbers: &[f64]| !is_unitree || numbers.chunks_exact(width).all(is_unit);
+    let mut numbers: Vec<f64> = Vec::new();
+    for (line, text) in lines {
+        let before = numbers.len();
+        let cells = text.split(',').map(|cell| cell.trim().parse());
+        let row: Option<Vec<f64>> = cells.map(Result::ok).collect();
+        let Some(row) = row.filter(|row| row.len() == width) else {
+            // Rows that are surely of the dialect stand before a damaged one.
+            if before < CERTAIN * width || !is_known(&numbers) {
+                return Ok(None);
+            }
+            let count = text.split(',').count();
+            let message = match count == width {
+                true => "a cell is not a number; the lines before have numbers alone".to_owned(),
+                false => format!("{count} numbers, and the lines before have {width}"),
+            };
+            return Err(Diagnostic {
+                location: Some(Location::Text { line, column: 1 }),
+                ..Diagnostic::new(file, Code::Columns, message)
+            });
+        };
+        numbers.extend(row);
+        let budgeted = budget.take(width, 2 * size_of::<f64>());
+        budgeted.map_err(|error| Diagnostic::new(file, Code::Memory, error.to_string()))?;
+    }
+    if numbers.is_empty() || !is_known(&numbers) {
         return Ok(None);
     }
     dialect

@@ -90,7 +90,7 @@ pub fn written_joints(tree: &Tree, bodies: &[usize]) -> Vec<usize> {
 
 /// For motions that no dialect can hold.
 const OTHER_FILES: &str =
-    "leave out --dialect (in Python `dialect`) and write NPZ, CSV or GLB, which can store it";
+    "leave out --dialect (in Python `dialect`) and write NPZ, CSV or Parquet, which can store it";
 
 impl WrittenDialect {
     /// The dialect of this name; case is ignored.

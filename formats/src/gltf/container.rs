@@ -4,6 +4,7 @@ use std::io::{self, Read, Write};
 use std::ops::Range;
 
 use crate::diagnostic::{Code, Diagnostic};
+use crate::foreign;
 use crate::gltf::json::Json;
 use crate::warnings::Warnings;
 
@@ -56,6 +57,11 @@ impl Container {
             warnings.warn(Code::ByteOrderMark, || {
                 (None, "a byte-order mark before the JSON; it is skipped")
             });
+        }
+        let is_other = !is_glb && !json.trim_ascii_start().starts_with(b"{");
+        if let Some(description) = foreign::description("", json).filter(|_| is_other) {
+            let message = format!("this looks like {description}");
+            return Err(refuse(Code::OtherFormat, message));
         }
         let text = std::str::from_utf8(json).map_err(|error| {
             let offset = error.valid_up_to();

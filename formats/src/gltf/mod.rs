@@ -47,7 +47,7 @@ use std::sync::Arc;
 
 use crate::diagnostic::{Code, Diagnostic, Location};
 use crate::feature::Feature;
-use crate::format::{Format, FormatOption, Loaded, ReadOptions};
+use crate::format::{Format, FormatOption, Loaded, ReadOptions, Space};
 use crate::gltf::container::Container;
 use crate::gltf::document::GltfDocument;
 use crate::gltf::json::Json;
@@ -194,7 +194,10 @@ pub fn read_gltf(
     }
     let nodes = Nodes::read(&json)?;
     let morphs = Morphs::read(&reader, &nodes)?;
-    let mut loaded = Loaded::default();
+    let mut loaded = Loaded {
+        space: Some(Space::GLTF),
+        ..Loaded::default()
+    };
     let mut read = Vec::with_capacity(animations);
     let mut faults: HashMap<(Option<Location>, String), usize> = HashMap::new();
     for index in 0..animations {

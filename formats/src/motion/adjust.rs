@@ -70,6 +70,9 @@ impl UpAxis {
 /// As [`adjust`].
 pub fn adjust_all(loaded: &mut Loaded, scale: f64, up: Option<UpAxis>) -> Result<(), TrackError> {
     let rotation = up.map_or(DQuat::IDENTITY, |up| up.rotation_from(loaded.space));
+    if rotation == DQuat::IDENTITY && scale == 1.0 {
+        return Ok(());
+    }
     for clip in &mut loaded.clips {
         *clip = adjust(clip, scale, rotation)?;
     }

@@ -12,7 +12,7 @@ use crate::decimal::time_text;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::format::{Loaded, ReadOptions};
 use crate::motion::grid::restore;
-use crate::motion::keys::Origin;
+use crate::motion::keys::{Origin, select};
 use crate::motion::{Motion, Scalar};
 use crate::printable::printable;
 use crate::table::clips::keys::RowKeys;
@@ -226,7 +226,8 @@ impl TableClip<'_> {
         for scalars in &plan.scalars {
             for (name, cell) in scalars.cells(self.table, warnings) {
                 let reader = self.reader(cell)?;
-                let (mut kept, mut keys): (Vec<f64>, Vec<f32>) = (Vec::new(), Vec::new());
+                let (mut key_times, mut keys): (Vec<f64>, Vec<f32>) = (Vec::new(), Vec::new());
+                let mut rows = Vec::new();
                 let numbers = positions.iter().map(|&position| {
                     let row = self.row(position as usize);
                     (row, (reader.at(row) * scalars.factor) as f32)
@@ -246,13 +247,23 @@ impl TableClip<'_> {
                             message,
                         ));
                     }
-                    let is_again = kept.last() == Some(&time) && keys.last() == Some(&number);
-                    if !number.is_nan() && !is_again {
-                        kept.push(time);
+                    if !number.is_nan() {
+                        key_times.push(time);
                         keys.push(number);
+                        rows.push(row);
                     }
                 }
-                let added = motion.add_scalar(Scalar::of(scalars.kind), &name, &kept, &keys, &[]);
+                let origin = Origin {
+                    file: &self.table.file,
+                    location: &|key| self.table.location(cell.column, rows[key]),
+                    duplicates: self.options.duplicates,
+                };
+                let equal = |i: usize, j: usize| keys[i].to_bits() == keys[j].to_bits();
+                let kept = origin.increasing(&mut key_times, equal, warnings)?;
+                select(&mut key_times, kept.as_deref());
+                select(&mut keys, kept.as_deref());
+                let scalar = Scalar::of(scalars.kind);
+                let added = motion.add_scalar(scalar, &name, &key_times, &keys, &[]);
                 added.map_err(|error| {
                     let message = format!("the scalar `{name}` cannot be kept: {error}");
                     self.table

@@ -9,14 +9,25 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias, TypeVar, overload
+from typing import TYPE_CHECKING, Any, Generic, Literal, TypeAlias, TypeVar, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tumble._errors import InputError
 from tumble._files import whole
-from tumble._tumble import Clip, Engine, File, Motions, load, load_all, represent, shaped
+from tumble._tumble import (
+    Clip,
+    DeviceArray,
+    DeviceMotions,
+    Engine,
+    File,
+    Motions,
+    load,
+    load_all,
+    represent,
+    shaped,
+)
 
 if TYPE_CHECKING:
     _Path: TypeAlias = str | os.PathLike[str]
@@ -25,6 +36,12 @@ if TYPE_CHECKING:
     _Name: TypeAlias = Literal[
         "rotations", "positions", "world_rotations", "velocities", "angular_velocities"
     ]
+    from typing_extensions import TypeVar as _TypeVar
+
+    # The arrays of results: of NumPy, or of a library on a device.
+    _A = _TypeVar("_A", default=NDArray[np.float32])
+else:
+    _A = TypeVar("_A")
 _NAMES: tuple[_Name, ...] = (
     "rotations",
     "positions",
@@ -41,12 +58,12 @@ _VERSION = 2
 _STORED = ("version", "method", "names", "lengths", "rates")
 
 
-class _WithWeakReferences:
+class _WithWeakReferences(Generic[_A]):
     __slots__ = ("__weakref__",)
 
 
 @dataclass(slots=True, eq=False)
-class MotionState(_WithWeakReferences):
+class MotionState(_WithWeakReferences[_A]):
     """The result of `MotionLibrary.sample`; an array that was left out is None.
 
     float32, x y z w, seconds and radians:
@@ -57,44 +74,50 @@ class MotionState(_WithWeakReferences):
     velocities: (…, joints, 3), in the world.
     angular_velocities: (…, joints, 3), about the world's axes.
 
+    Arrays of a library on a device are `DeviceArray`s.
+
     >>> import tumble
     >>> tumble.MotionState().rotations is None
     True
     """
 
-    rotations: NDArray[np.float32] | None = None
-    positions: NDArray[np.float32] | None = None
-    world_rotations: NDArray[np.float32] | None = None
-    velocities: NDArray[np.float32] | None = None
-    angular_velocities: NDArray[np.float32] | None = None
+    rotations: _A | None = None
+    positions: _A | None = None
+    world_rotations: _A | None = None
+    velocities: _A | None = None
+    angular_velocities: _A | None = None
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, MotionState):
             return NotImplemented
         pairs = [(getattr(self, name), getattr(other, name)) for name in _NAMES]
         return all(
-            first is second or first is not None and second is not None and np.array_equal(first, second)
+            first is second
+            or first is not None
+            and second is not None
+            and np.array_equal(_on_host(first), _on_host(second))
             for first, second in pairs
         )
 
 
 if TYPE_CHECKING:
-    _S = TypeVar("_S", bound=MotionState)
+    _S = TypeVar("_S", bound=MotionState[Any])
+    _Device: TypeAlias = str | int | Engine
     _Array: TypeAlias = NDArray[np.float32]
     _Representation: TypeAlias = Literal["quaternion", "matrix", "6d", "rotvec"]
     _Order: TypeAlias = Literal["xyzw", "wxyz"]
     _Progress: TypeAlias = Callable[[int, int], object] | Any
 
-    class _Whole(MotionState):
+    class _Whole(MotionState[_A]):
         """A state of which no array was left out."""
 
-        rotations: _Array
-        positions: _Array
-        world_rotations: _Array
-        velocities: _Array
-        angular_velocities: _Array
+        rotations: _A
+        positions: _A
+        world_rotations: _A
+        velocities: _A
+        angular_velocities: _A
 
-    class _Some(MotionState):
+    class _Some(MotionState[_A]):
         """A state with the arrays that were asked for; which, types do not say."""
 
         rotations: Any
@@ -103,20 +126,20 @@ if TYPE_CHECKING:
         velocities: Any
         angular_velocities: Any
 
-    class _Rotations(_Some):
-        rotations: _Array
+    class _Rotations(_Some[_A]):
+        rotations: _A
 
-    class _Positions(_Some):
-        positions: _Array
+    class _Positions(_Some[_A]):
+        positions: _A
 
-    class _WorldRotations(_Some):
-        world_rotations: _Array
+    class _WorldRotations(_Some[_A]):
+        world_rotations: _A
 
-    class _Velocities(_Some):
-        velocities: _Array
+    class _Velocities(_Some[_A]):
+        velocities: _A
 
-    class _AngularVelocities(_Some):
-        angular_velocities: _Array
+    class _AngularVelocities(_Some[_A]):
+        angular_velocities: _A
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,7 +162,7 @@ class Skipped:
     message: str
 
 
-class MotionLibrary:
+class MotionLibrary(Generic[_A]):
     """Clips of one skeleton, of any lengths and rates, which can be sampled at any times.
 
     `clips`: a list of `Clip`s with the same joints, in any order: they are matched by name, by index only if no clip
@@ -151,6 +174,10 @@ class MotionLibrary:
     those of an engine that all calls share. `on_error`: "refuse", or "skip": clips that do not fit the skeleton are
     left out, and `skipped` lists them. `packed`: with slerp, keys of rotations take 8 bytes instead of 16; rotations
     are then within 1e-5 rad of the exact ones, each relative to its parent.
+
+    `device`: a Vulkan device, by the name that `Engine` takes, or an engine on one. The clips then lie in its memory,
+    and `sample` returns `DeviceArray`s, with the CPU's bits. A library that needs more memory than the device has is
+    refused. "cpu" is the same as no device.
 
     A clip without offsets, such as an SMPL body without a model of its shape, has rotations only: its positions and
     velocities are refused.
@@ -175,6 +202,34 @@ class MotionLibrary:
     rates: NDArray[np.float64]
     skipped: list[Skipped]
 
+    @overload
+    def __init__(
+        self: MotionLibrary[_Array],
+        clips: Iterable[Clip],
+        *,
+        method: str = ...,
+        skeleton: _Skeleton | None = ...,
+        names: Sequence[str] | None = ...,
+        engine: Engine | None = ...,
+        on_error: _OnError = ...,
+        packed: bool = ...,
+        device: Literal["cpu"] | None = ...,
+    ) -> None: ...
+
+    @overload
+    def __init__(
+        self: MotionLibrary[DeviceArray],
+        clips: Iterable[Clip],
+        *,
+        method: str = ...,
+        skeleton: _Skeleton | None = ...,
+        names: Sequence[str] | None = ...,
+        engine: Engine | None = ...,
+        on_error: _OnError = ...,
+        packed: bool = ...,
+        device: _Device,
+    ) -> None: ...
+
     def __init__(
         self,
         clips: Iterable[Clip],
@@ -185,6 +240,7 @@ class MotionLibrary:
         engine: Engine | None = None,
         on_error: _OnError = "refuse",
         packed: bool = False,
+        device: _Device | None = None,
     ) -> None:
         clips = list(clips)
         skip = _skips(on_error)
@@ -207,6 +263,45 @@ class MotionLibrary:
         self._method = method
         self._file: str | None = None
         self._only: NDArray[np.int64] | None = None
+        self._put_on(device)
+
+    @overload
+    @classmethod
+    def load(
+        cls,
+        files: _Path | Iterable[_Path],
+        *,
+        skeleton: _Skeleton | None = ...,
+        method: str = ...,
+        engine: Engine | None = ...,
+        on_error: _OnError = ...,
+        packed: bool = ...,
+        fps: float | str | Fraction | None = ...,
+        tracks: Sequence[str] | Sequence[int] | None = ...,
+        progress: _Progress | None = ...,
+        shard: tuple[int, int] | None = ...,
+        device: Literal["cpu"] | None = ...,
+        **options: Any,
+    ) -> MotionLibrary[_Array]: ...
+
+    @overload
+    @classmethod
+    def load(
+        cls,
+        files: _Path | Iterable[_Path],
+        *,
+        skeleton: _Skeleton | None = ...,
+        method: str = ...,
+        engine: Engine | None = ...,
+        on_error: _OnError = ...,
+        packed: bool = ...,
+        fps: float | str | Fraction | None = ...,
+        tracks: Sequence[str] | Sequence[int] | None = ...,
+        progress: _Progress | None = ...,
+        shard: tuple[int, int] | None = ...,
+        device: _Device,
+        **options: Any,
+    ) -> MotionLibrary[DeviceArray]: ...
 
     @classmethod
     def load(
@@ -222,8 +317,9 @@ class MotionLibrary:
         tracks: Sequence[str] | Sequence[int] | None = None,
         progress: _Progress | None = None,
         shard: tuple[int, int] | None = None,
+        device: _Device | None = None,
         **options: Any,
-    ) -> MotionLibrary:
+    ) -> MotionLibrary[Any]:
         """Reads motion files: a path, a pattern such as "amass/**/*.npz", or a list of them, on all threads. Every clip
         of every file belongs to the library, in the order of the names.
 
@@ -235,7 +331,7 @@ class MotionLibrary:
         `body_model` and `map`. `on_error`: "refuse" ends at the first file that cannot be read; "skip" leaves out such
         files, and clips that do not fit the skeleton, and lists them in `skipped`. Files of AMASS without a motion
         (`shape.npz`, `*_stagei.npz`) are left out, too. `progress`: a bar such as `tqdm.tqdm` or an instance of it, or a
-        function, which is called with the number of files read so far and of all. `packed`: as of the class.
+        function, which is called with the number of files read so far and of all. `packed`, `device`: as of the class.
 
         >>> import tempfile, os, tumble
         >>> folder = tempfile.mkdtemp()
@@ -263,11 +359,31 @@ class MotionLibrary:
             raise InputError(f"no file could be read; the first: {skipped[0].message}")
         if skeleton is not None and not isinstance(skeleton, tuple):
             skeleton = shaped(_clip_of(skeleton), tracks=tracks)
-        made = cls(clips, method=method, skeleton=skeleton, engine=engine, on_error=on_error, packed=packed)
+        made: MotionLibrary[Any] = cls(
+            clips, method=method, skeleton=skeleton, engine=engine, on_error=on_error, packed=packed, device=device
+        )
         made.skipped = skipped + made.skipped
         return made
 
-    def shard(self, rank: int, processes: int) -> MotionLibrary:
+    def _put_on(self, device: _Device | None) -> None:
+        """Copies the clips to a device."""
+        self._device: Engine | None = None
+        if device is None or (isinstance(device, str) and device.lower() == "cpu"):
+            return
+        self._device = device if isinstance(device, Engine) else Engine(device)
+        self._on_device = DeviceMotions(self._motions, self._device)
+
+    @property
+    def device(self) -> str:
+        """The name of the device on which the clips lie: "CPU", or that of a Vulkan device.
+
+        >>> import tumble
+        >>> tumble.MotionLibrary([tumble.Clip([0.0, 2.0], [[[0, 0, 0, 1], [0, 0, 1, 0]]], parents=[None])]).device
+        'CPU'
+        """
+        return "CPU" if self._device is None else self._device.device
+
+    def shard(self, rank: int, processes: int) -> MotionLibrary[_A]:
         """The clips for one of several processes; each clip belongs to one process. The memory is shared, not copied.
 
         >>> import tumble
@@ -276,7 +392,7 @@ class MotionLibrary:
         ['a', 'c']
         """
         share = _share(len(self), rank, processes)
-        part = MotionLibrary.__new__(MotionLibrary)
+        part: MotionLibrary[_A] = MotionLibrary.__new__(MotionLibrary)
         part.__dict__.update(self.__dict__)
         part.names = [self.names[index] for index in share]
         part.lengths, part.rates = self.lengths[share], self.rates[share]
@@ -311,7 +427,7 @@ class MotionLibrary:
         order: _Order = ...,
         rotations: _Representation = ...,
         out: None = ...,
-    ) -> _Whole: ...
+    ) -> _Whole[_A]: ...
 
     @overload
     def sample(
@@ -324,7 +440,7 @@ class MotionLibrary:
         order: _Order = ...,
         rotations: _Representation = ...,
         out: None = ...,
-    ) -> _Rotations: ...
+    ) -> _Rotations[_A]: ...
 
     @overload
     def sample(
@@ -337,7 +453,7 @@ class MotionLibrary:
         order: _Order = ...,
         rotations: _Representation = ...,
         out: None = ...,
-    ) -> _Positions: ...
+    ) -> _Positions[_A]: ...
 
     @overload
     def sample(
@@ -350,7 +466,7 @@ class MotionLibrary:
         order: _Order = ...,
         rotations: _Representation = ...,
         out: None = ...,
-    ) -> _WorldRotations: ...
+    ) -> _WorldRotations[_A]: ...
 
     @overload
     def sample(
@@ -363,7 +479,7 @@ class MotionLibrary:
         order: _Order = ...,
         rotations: _Representation = ...,
         out: None = ...,
-    ) -> _Velocities: ...
+    ) -> _Velocities[_A]: ...
 
     @overload
     def sample(
@@ -376,7 +492,7 @@ class MotionLibrary:
         order: _Order = ...,
         rotations: _Representation = ...,
         out: None = ...,
-    ) -> _AngularVelocities: ...
+    ) -> _AngularVelocities[_A]: ...
 
     @overload
     def sample(
@@ -389,7 +505,7 @@ class MotionLibrary:
         order: _Order = ...,
         rotations: _Representation = ...,
         out: None = ...,
-    ) -> _Some: ...
+    ) -> _Some[_A]: ...
 
     @overload
     def sample(
@@ -413,8 +529,8 @@ class MotionLibrary:
         finite: bool = False,
         order: _Order = "xyzw",
         rotations: _Representation = "quaternion",
-        out: MotionState | None = None,
-    ) -> MotionState:
+        out: MotionState[Any] | None = None,
+    ) -> MotionState[Any]:
         """The states of instances: `clip_ids` has the clip of each instance, and `times` its time, in seconds after the clip's
         first key. (`Clip` and `Engine` use the times of the keys.) Both have the shape of the result, (N,) for example, or
         shapes that broadcast to it, such as (N, 1) and (N, 10), or a number and (N,).
@@ -425,6 +541,9 @@ class MotionLibrary:
         how both arrays of rotations are stored: "quaternion" (…, 4), "matrix" (…, 3, 3) for column vectors, "6d" (…, 6),
         the matrix's first two columns, or "rotvec" (…, 3), axis times angle.
 
+        A library on a device returns new `DeviceArray`s: `out`, `order` and `rotations` are for the CPU alone. `clip_ids`
+        and `times` are read by the host; arrays of a device are copied to it first.
+
         >>> import tumble
         >>> door = tumble.Clip([0.0, 2.0], [[[0, 0, 0, 1], [0, 0, 1, 0]]], parents=[None])
         >>> library = tumble.MotionLibrary([door])
@@ -433,10 +552,10 @@ class MotionLibrary:
         >>> library.sample(0, [0.5, 1.0], rotations="6d").rotations.shape
         (2, 1, 6)
         """
-        ids = np.asarray(clip_ids)
+        ids = _on_host(clip_ids)
         if ids.dtype.kind not in "iu" and ids.size:
             raise InputError(f"clip_ids: their type is {ids.dtype}; give whole numbers")
-        moments = np.asarray(times, np.float64)
+        moments = _on_host(times).astype(np.float64, copy=False)
         try:
             shape = np.broadcast_shapes(ids.shape, moments.shape)
         except ValueError:
@@ -445,10 +564,17 @@ class MotionLibrary:
         ids = self._ids(np.ascontiguousarray(np.broadcast_to(ids, shape), np.int64).reshape(-1))
         moments = np.ascontiguousarray(np.broadcast_to(moments, shape)).reshape(-1)
         each = _shapes_of(order, rotations)
+        for name in arrays if arrays is not None else ():
+            if name not in _NAMES:
+                raise InputError(f"arrays: there is no `{name}`; there are {', '.join(_NAMES)}")
+        if self._device is not None:
+            if out is not None or order != "xyzw" or rotations != "quaternion":
+                raise InputError(
+                    "out, order and rotations: a library on a device makes new arrays of quaternions x y z w; leave them out,"
+                    " and convert on the device, or use a library without `device`"
+                )
+            return self._sampled_on_device(ids, moments, shape, _NAMES if arrays is None else tuple(arrays), finite)
         if out is None:
-            for name in arrays if arrays is not None else ():
-                if name not in _NAMES:
-                    raise InputError(f"arrays: there is no `{name}`; there are {', '.join(_NAMES)}")
             joints = self._motions.joints
             asked = _NAMES if arrays is None else arrays
             out = MotionState(**{name: _aligned((*shape, joints, *each[name])) for name in asked})
@@ -477,17 +603,35 @@ class MotionLibrary:
                     array[...] = np.roll(array, 1, axis=-1)
         return out
 
+    def _frames(self, ids: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """The rates and lengths of the clips in memory, for differences between frames."""
+        rates = self._each(self.rates)
+        known = np.isnan(rates[ids[(ids >= 0) & (ids < len(rates))]])
+        if known.any():
+            raise InputError("finite: a clip has no rate; load it with `fps`")
+        return rates, self._each(self.lengths)
+
+    def _sampled_on_device(
+        self,
+        ids: NDArray[np.int64],
+        moments: NDArray[np.float64],
+        shape: tuple[int, ...],
+        names: Sequence[str],
+        finite: bool,
+    ) -> MotionState[DeviceArray]:
+        """The arrays with these names, in memory of the device."""
+        frames = self._frames(ids) if finite and any(name.endswith("velocities") for name in names) else None
+        names = list(dict.fromkeys(names))
+        found = self._on_device.sample(ids, moments, shape, names, frames)
+        return MotionState(**dict(zip(names, found, strict=True)))
+
     def _fill(
         self, ids: NDArray[np.int64], moments: NDArray[np.float64], finite: bool, out: MotionState
     ) -> None:
         """Fills the arrays of instances, (N,)."""
         frames = None
         if finite and not (out.velocities is None and out.angular_velocities is None):
-            rates = self._each(self.rates)
-            known = np.isnan(rates[ids[(ids >= 0) & (ids < len(rates))]])
-            if known.any():
-                raise InputError("finite: a clip has no rate; load it with `fps`")
-            frames = (rates, self._each(self.lengths))
+            frames = self._frames(ids)
         self._motions.sample(
             self._engine,
             ids,
@@ -513,7 +657,7 @@ class MotionLibrary:
         order: _Order = ...,
         rotations: _Representation = ...,
         out: None = ...,
-    ) -> _Whole: ...
+    ) -> _Whole[_A]: ...
 
     @overload
     def sample_windows(
@@ -528,7 +672,7 @@ class MotionLibrary:
         order: _Order = ...,
         rotations: _Representation = ...,
         out: None = ...,
-    ) -> _Rotations: ...
+    ) -> _Rotations[_A]: ...
 
     @overload
     def sample_windows(
@@ -543,7 +687,7 @@ class MotionLibrary:
         order: _Order = ...,
         rotations: _Representation = ...,
         out: None = ...,
-    ) -> _Positions: ...
+    ) -> _Positions[_A]: ...
 
     @overload
     def sample_windows(
@@ -558,7 +702,7 @@ class MotionLibrary:
         order: _Order = ...,
         rotations: _Representation = ...,
         out: None = ...,
-    ) -> _WorldRotations: ...
+    ) -> _WorldRotations[_A]: ...
 
     @overload
     def sample_windows(
@@ -573,7 +717,7 @@ class MotionLibrary:
         order: _Order = ...,
         rotations: _Representation = ...,
         out: None = ...,
-    ) -> _Velocities: ...
+    ) -> _Velocities[_A]: ...
 
     @overload
     def sample_windows(
@@ -588,7 +732,7 @@ class MotionLibrary:
         order: _Order = ...,
         rotations: _Representation = ...,
         out: None = ...,
-    ) -> _AngularVelocities: ...
+    ) -> _AngularVelocities[_A]: ...
 
     @overload
     def sample_windows(
@@ -603,7 +747,7 @@ class MotionLibrary:
         order: _Order = ...,
         rotations: _Representation = ...,
         out: None = ...,
-    ) -> _Some: ...
+    ) -> _Some[_A]: ...
 
     @overload
     def sample_windows(
@@ -631,8 +775,8 @@ class MotionLibrary:
         finite: bool = False,
         order: _Order = "xyzw",
         rotations: _Representation = "quaternion",
-        out: MotionState | None = None,
-    ) -> MotionState:
+        out: MotionState[Any] | None = None,
+    ) -> MotionState[Any]:
         """`count` states of each instance, from the time `starts` on, `fps` a second: arrays (…, count, joints, …) for
         `clip_ids` and `starts` of the shape (…). Other keywords are those of `sample`.
 
@@ -644,14 +788,14 @@ class MotionLibrary:
         """
         if count < 0 or not fps > 0:
             raise InputError(f"count and fps: {count} and {fps}; give a number of states, and a rate greater than 0")
-        ids, first = np.asarray(clip_ids)[..., None], np.asarray(starts, np.float64)[..., None]
+        ids, first = _on_host(clip_ids)[..., None], _on_host(starts).astype(np.float64, copy=False)[..., None]
         times = first + np.arange(count) / fps
         keywords: dict[str, Any] = {"finite": finite, "order": order, "rotations": rotations}
         if arrays is not None:
             keywords["arrays"] = arrays
         if out is not None:
             keywords["out"] = out
-        found: MotionState = self.sample(ids, times, **keywords)
+        found: MotionState[Any] = self.sample(ids, times, **keywords)
         return found
 
     def draw(
@@ -679,7 +823,8 @@ class MotionLibrary:
     @property
     def nbytes(self) -> int:
         """The bytes of the prepared clips: with slerp 16 a key of a joint and 16 to 48 a key of the root's position, or
-        8 a key of a joint if `packed`; 192 a key with smooth methods.
+        8 a key of a joint if `packed`; 192 a key with smooth methods. A library on a device has as many there, and keeps
+        those of the host for `save` and for copies.
 
         >>> import numpy as np, tumble
         >>> keys = np.tile([0.0, 0.0, 0.0, 1.0], (22, 3000, 1))
@@ -716,12 +861,24 @@ class MotionLibrary:
             for name, array in self._arrays().items():
                 _write(archive, name, array)
 
+    @overload
+    @classmethod
+    def open(  # type: ignore[overload-overlap]
+        cls, path: _Path, *, mmap: bool = ..., engine: Engine | None = ..., device: Literal["cpu"] | None = ...
+    ) -> MotionLibrary[_Array]: ...
+
+    @overload
     @classmethod
     def open(
-        cls, path: _Path, *, mmap: bool = True, engine: Engine | None = None
-    ) -> MotionLibrary:
+        cls, path: _Path, *, mmap: bool = ..., engine: Engine | None = ..., device: _Device
+    ) -> MotionLibrary[DeviceArray]: ...
+
+    @classmethod
+    def open(
+        cls, path: _Path, *, mmap: bool = True, engine: Engine | None = None, device: _Device | None = None
+    ) -> MotionLibrary[Any]:
         """Opens a file of `save`. With `mmap` the file is mapped: motions that are not sampled are not read, and
-        several processes share its memory.
+        several processes share its memory. `device`: as of the class; the file is copied to it.
 
         >>> import tumble
         >>> tumble.MotionLibrary.open("missing.npz")
@@ -735,16 +892,20 @@ class MotionLibrary:
             raise FileNotFoundError(2, os.strerror(2), os.fspath(path)) from None
         except (zipfile.BadZipFile, ValueError, KeyError, EOFError) as error:
             raise InputError(f"{os.fspath(path)}: no motion library: {error}") from error
-        return cls._of_arrays(arrays, engine, file if mmap else None)
+        return cls._of_arrays(arrays, engine, file if mmap else None, device)
 
     @classmethod
     def _of_arrays(
-        cls, arrays: dict[str, Any], engine: Engine | None, file: str | None = None
-    ) -> MotionLibrary:
+        cls,
+        arrays: dict[str, Any],
+        engine: Engine | None,
+        file: str | None = None,
+        device: _Device | None = None,
+    ) -> MotionLibrary[Any]:
         missing = [name for name in _STORED if name not in arrays]
         if missing or int(arrays["version"]) not in range(1, _VERSION + 1):
             raise InputError(f"{file or 'arrays'}: not a motion library of this version of tumble")
-        self = cls.__new__(cls)
+        self: MotionLibrary[Any] = cls.__new__(cls)
         self.names = [str(name) for name in arrays["names"]]
         self.lengths = np.asarray(arrays["lengths"])
         self.rates = np.asarray(arrays["rates"])
@@ -754,6 +915,7 @@ class MotionLibrary:
         self._file = file
         self.skipped = []
         self._only = np.asarray(arrays["only"]) if "only" in arrays else None
+        self._put_on(device)
         return self
 
     def _arrays(self) -> dict[str, Any]:
@@ -772,8 +934,8 @@ class MotionLibrary:
 
     def __reduce__(self) -> tuple[Any, ...]:
         if self._file is not None:
-            return _opened, (self._file, self._engine, self._only)
-        return MotionLibrary._of_arrays, (self._arrays(), self._engine)
+            return _opened, (self._file, self._engine, self._only, self._device)
+        return MotionLibrary._of_arrays, (self._arrays(), self._engine, None, self._device)
 
     def __len__(self) -> int:
         return len(self.names)
@@ -795,13 +957,26 @@ class MotionLibrary:
 
     def __repr__(self) -> str:
         seconds = float(self.lengths.sum())
-        return f"MotionLibrary({len(self)} clips, {self.joints} joints, {seconds:.6g} s)"
+        device = "" if self._device is None else f", on {self.device}"
+        return f"MotionLibrary({len(self)} clips, {self.joints} joints, {seconds:.6g} s{device})"
 
 
 def _skips(on_error: str) -> bool:
     if on_error not in ("refuse", "skip"):
         raise InputError(f"on_error: there is no `{on_error}`; there are refuse, skip")
     return on_error == "skip"
+
+
+def _on_host(values: Any) -> NDArray[Any]:
+    """Numbers as an array of NumPy's; those of a device are copied."""
+    if isinstance(values, DeviceArray):
+        return values.numpy()
+    kind = getattr(values, "__dlpack_device__", lambda: (1, 0))()[0]
+    if not isinstance(values, np.ndarray) and kind not in (1, 3):
+        # Tensors of PyTorch have `cpu`, arrays of CuPy `get`; JAX copies by itself.
+        copy = getattr(values, "cpu", None) or getattr(values, "get", None)
+        values = copy() if copy is not None else values
+    return np.asarray(values)
 
 
 def _aligned(shape: tuple[int, ...]) -> NDArray[np.float32]:
@@ -852,9 +1027,9 @@ def _flat(state: MotionState, axes: int) -> MotionState:
 
 
 def _opened(
-    file: str, engine: Engine, only: NDArray[np.int64] | None = None
-) -> MotionLibrary:
-    library = MotionLibrary.open(file, engine=engine)
+    file: str, engine: Engine, only: NDArray[np.int64] | None = None, device: Engine | None = None
+) -> MotionLibrary[Any]:
+    library: MotionLibrary[Any] = MotionLibrary.open(file, engine=engine, device=device)
     if only is None or library._only is not None:
         return library
     library.names = [library.names[index] for index in only]

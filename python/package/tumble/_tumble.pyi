@@ -18,6 +18,7 @@ __all__ = [
     "ClipDifference",
     "Crowd",
     "DeviceArray",
+    "DeviceMotions",
     "Engine",
     "File",
     "JointDifference",
@@ -1267,6 +1268,20 @@ class Motions:
         angular_velocities: _Single | None,
         frames: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None,
     ) -> None: ...
+
+@final
+class DeviceMotions:
+    def __new__(cls, motions: Motions, engine: Engine) -> DeviceMotions: ...
+    @property
+    def nbytes(self) -> int: ...
+    def sample(
+        self,
+        clip_ids: NDArray[np.int64],
+        times: NDArray[np.float64],
+        shape: Sequence[int],
+        names: Sequence[str],
+        frames: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None,
+    ) -> list[DeviceArray]: ...
 
 _Six: TypeAlias = Literal["six-columns", "six-rows", "six-interleaved"]
 _Axis: TypeAlias = Literal["x", "y", "z"]

@@ -197,7 +197,7 @@ impl VulkanEngine {
             })
             .collect();
         let dispatch = lanes.dispatch([0, runs.len() as u32], 0, 0);
-        let groups = lanes.workgroups(runs.len() as u32);
+        let groups = lanes.workgroups(runs.len() as u32, 1);
         let runs = upload(bytemuck::cast_slice(&runs))?;
         let buffers = [&constants, &constants, &runs, buffer];
         self.rate(bytes, |submission| {

@@ -6,7 +6,8 @@ pub(crate) mod figures;
 pub(crate) mod from_keys;
 pub(crate) mod run;
 
-use std::mem::take;
+use std::mem::{ManuallyDrop, take};
+use std::ops::{Deref, DerefMut};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 
@@ -17,6 +18,7 @@ use crate::cpu::engine::CpuEngine;
 use crate::gpu::buffer::{Buffer, Residence};
 use crate::gpu::device::{DeviceQueue, LogicalDevice, QueueLane};
 use crate::gpu::engine::from_keys::KeyUploads;
+use crate::gpu::external::Exported;
 use crate::gpu::handles::VulkanHandles;
 use crate::gpu::in_flight::{InFlight, Target};
 use crate::gpu::instance::Instance;
@@ -32,6 +34,7 @@ use crate::gpu::upload::writable;
 use crate::machine::error::calls::Named as _;
 use crate::machine::error::{EvaluateError, VulkanError};
 use crate::machine::options::{EngineOptions, RunLanes, Timings, Transfer};
+use crate::memory::OutOfMemoryError;
 use crate::output::buffer::OutputBuffer;
 use crate::output::encoding::Encoding;
 use crate::output::rotations::{Layout, Storage};
@@ -63,6 +66,8 @@ pub(crate) struct VulkanEngine {
     pub(crate) device: Arc<LogicalDevice>,
     /// Pipelines, which are made when they are first needed.
     pipelines: Mutex<[Option<Arc<Pipeline>>; KERNELS.len()]>,
+    /// Kernels in whose place others are used, because they differ from the CPU.
+    replaced: Mutex<Vec<KernelCheck>>,
     pub(crate) in_flight: Exclusive<Vec<InFlight<WorkLists>>>,
     pub(crate) keys_in_flight: Exclusive<Vec<InFlight<KeyUploads>>>,
     pub(crate) in_flight_count: usize,
@@ -111,6 +116,7 @@ impl VulkanEngine {
         let bytes = |bytes| usize::try_from(bytes).unwrap_or(usize::MAX);
         Self {
             pipelines: Mutex::new([const { None }; KERNELS.len()]),
+            replaced: Mutex::default(),
             in_flight: Exclusive::default(),
             keys_in_flight: Exclusive::default(),
             in_flight_count,
@@ -212,23 +218,68 @@ impl VulkanEngine {
 
     /// Refuses a kernel that differs from the CPU, unless inexact devices are allowed.
     fn trust(&self, kernel: Kernel, pipeline: &Pipeline) -> Result<(), VulkanError> {
-        let passes = &self.device.passes;
-        let pass = KernelPass::new(&self.device.physical, pipeline.code_hash);
-        if passes.has(&pass) {
-            return Ok(());
-        }
-        let check = kernel_check::check(kernel, pipeline)?;
-        if check.differing == 0 {
-            passes.remember([pass]);
-        } else if !self.allow_inexact {
-            return Err(VulkanError::InexactKernel {
+        match self.difference(kernel, pipeline)? {
+            Some(check) if !self.allow_inexact => Err(VulkanError::InexactKernel {
                 device: self.device.physical.info.name.clone(),
                 kernel: check.name,
                 differing: check.differing,
                 total: check.total,
-            });
+            }),
+            _ => Ok(()),
         }
-        Ok(())
+    }
+
+    /// The check of a kernel that differs from the CPU; `None` if it does not. It is not run if it is known to pass.
+    fn difference(
+        &self,
+        kernel: Kernel,
+        pipeline: &Pipeline,
+    ) -> Result<Option<KernelCheck>, VulkanError> {
+        let passes = &self.device.passes;
+        let pass = KernelPass::new(&self.device.physical, pipeline.code_hash);
+        if passes.has(&pass) {
+            return Ok(None);
+        }
+        let check = kernel_check::check(kernel, pipeline)?;
+        if check.differing > 0 {
+            return Ok(Some(check));
+        }
+        passes.remember([pass]);
+        Ok(None)
+    }
+
+    /// Whether the engine evaluates with a kernel where others could take its place: the device runs it, and its bits are
+    /// the CPU's. A kernel that differs is refused here even if inexact devices are allowed, because the others need not
+    /// differ; it is listed as [`replaced`](KernelCheck::replaced). Other errors are left to the first use of the kernel.
+    pub(crate) fn uses(&self, kernel: Kernel) -> bool {
+        if !Pipeline::can_run(&self.device, kernel) {
+            return false;
+        }
+        let name = kernel.code(self.device.variants()).0;
+        let is_replaced = |check: &KernelCheck| check.name == name;
+        if !kernel.is_replaceable() || lock(&self.pipelines)[kernel as usize].is_some() {
+            return true;
+        }
+        if lock(&self.replaced).iter().any(is_replaced) {
+            return false;
+        }
+        let Ok(made) = Pipeline::new(&self.device, kernel, Exactness::Demanded) else {
+            return true;
+        };
+        match self.difference(kernel, &made) {
+            Ok(Some(check)) => {
+                let mut replaced = lock(&self.replaced);
+                if !replaced.iter().any(is_replaced) {
+                    replaced.push(check);
+                }
+                false
+            }
+            Ok(None) => {
+                lock(&self.pipelines)[kernel as usize].get_or_insert(Arc::new(made));
+                true
+            }
+            Err(_) => true,
+        }
     }
 
     /// Checks every kernel, while `each` returns true; with `only_unknown`, the kernels that are known to pass are
@@ -292,11 +343,16 @@ impl VulkanEngine {
 
     fn known_kernel(&self, code: &KernelCode) -> KernelCheck {
         let (name, ..) = code.kernel.code(self.device.variants());
+        let mut replaced = lock(&self.replaced).clone().into_iter();
+        if let Some(check) = replaced.find(|check| check.name == name) {
+            return check;
+        }
         let hash = Pipeline::code_hash(&self.device, code.kernel);
         KernelCheck {
             name,
             total: 0,
             differing: 0,
+            replaced: false,
             remembered: self
                 .device
                 .passes
@@ -437,7 +493,7 @@ impl VulkanEngine {
             false => Residence::Readback,
         };
         let buffer = match fits && pays {
-            true => match self.output_buffer(bytes, residence) {
+            true => match self.free_buffer(bytes, residence) {
                 // The result may still fit if it is computed window by window.
                 Err(error) if error.is_out_of_memory() => None,
                 // The host changes some rotations (`patches`). In memory that is not coherent it would have to flush
@@ -459,11 +515,8 @@ impl VulkanEngine {
             false => Target::Staged(&mut buffer),
         };
         self.run(job, &whole, target, kept.as_deref())?;
-        Ok(Box::new(MappedQuats {
-            buffer: Some(buffer),
-            count: whole.len(),
-            free: Arc::clone(&self.free),
-        }))
+        let count = whole.len();
+        Ok(Box::new(MappedQuats { buffer, count }))
     }
 
     /// Evaluates a window into the caller's memory.
@@ -479,46 +532,89 @@ impl VulkanEngine {
         self.run(job, window, target, kept.as_deref())
     }
 
-    /// A free buffer of about this size, if there is one, else a new one.
-    fn output_buffer(&self, bytes: u64, residence: Residence) -> Result<Buffer, VulkanError> {
+    /// A buffer for a result that the host reads: a free one of about this size, if there is one, else a new one.
+    pub(crate) fn free_buffer(
+        &self,
+        bytes: u64,
+        residence: Residence,
+    ) -> Result<FreeBuffer, VulkanError> {
         let mut free = lock(&self.free);
         let fits = |buffer: &Buffer| (bytes..=bytes.max(1 << 16) * 2).contains(&buffer.size);
-        if let Some(i) = free.iter().position(fits) {
-            return Ok(free.swap_remove(i));
-        }
+        let kept = free.iter().position(fits).map(|i| free.swap_remove(i));
         drop(free);
-        Buffer::new(&self.device, "tumble rotations", bytes, residence)
+        let made = || Buffer::new(&self.device, "tumble rotations", bytes, residence);
+        Ok(FreeBuffer {
+            buffer: ManuallyDrop::new(kept.map_or_else(made, Ok)?),
+            free: Arc::clone(&self.free),
+        })
+    }
+
+    /// Memory for a result of this size that other interfaces import.
+    pub(crate) fn exported(&self, bytes: u64) -> Result<Arc<Exported>, EvaluateError> {
+        // The result is allocated as a whole, so smaller windows would not help.
+        let exported = match Exported::new(&self.device, bytes) {
+            Err(error) if error.is_out_of_memory() && self.give_back() => {
+                Exported::new(&self.device, bytes)
+            }
+            made => made,
+        };
+        let exported = exported.map_err(|error| match error.is_out_of_memory() {
+            true => {
+                let needed = usize::try_from(bytes).unwrap_or(usize::MAX);
+                OutOfMemoryError::new::<u8>("a result in the device's memory", needed).into()
+            }
+            false => EvaluateError::from(error),
+        });
+        Ok(Arc::new(exported?))
     }
 }
 
 /// Output buffers of dropped results, for reuse: the first access to fresh memory takes longer than evaluating.
 type FreeBuffers = Arc<Mutex<Vec<Buffer>>>;
 
-/// A result in mapped memory. When it is dropped, its buffer returns to the engine.
-struct MappedQuats {
-    /// `Some` until it is dropped.
-    buffer: Option<Buffer>,
-    count: usize,
+/// A mapped buffer for a result. When it is dropped, the buffer returns to the engine.
+pub(crate) struct FreeBuffer {
+    buffer: ManuallyDrop<Buffer>,
     free: FreeBuffers,
 }
 
-impl Storage for MappedQuats {
-    fn quats(&self) -> &[Quat] {
-        let all = 0..self.count * size_of::<Quat>();
-        let bytes = self.buffer.as_ref().map(|buffer| buffer.bytes(all));
-        bytemuck::cast_slice(bytes.unwrap_or_default())
+impl Deref for FreeBuffer {
+    type Target = Buffer;
+
+    fn deref(&self) -> &Buffer {
+        &self.buffer
+    }
+}
+
+impl DerefMut for FreeBuffer {
+    fn deref_mut(&mut self) -> &mut Buffer {
+        &mut self.buffer
     }
 }
 
 /// The maximum number of output buffers that are kept for later evaluations.
 const KEPT: usize = 4;
 
-impl Drop for MappedQuats {
+impl Drop for FreeBuffer {
     fn drop(&mut self) {
         let mut free = lock(&self.free);
         if free.len() == KEPT {
             free.remove(0);
         }
-        free.extend(self.buffer.take());
+        // SAFETY: it is taken once, here, and not used afterwards.
+        free.push(unsafe { ManuallyDrop::take(&mut self.buffer) });
+    }
+}
+
+/// A result in mapped memory.
+struct MappedQuats {
+    buffer: FreeBuffer,
+    count: usize,
+}
+
+impl Storage for MappedQuats {
+    fn quats(&self) -> &[Quat] {
+        let all = 0..self.count * size_of::<Quat>();
+        bytemuck::cast_slice(self.buffer.bytes(all))
     }
 }

@@ -3,6 +3,7 @@
 
 mod crowd;
 mod from_keys;
+mod motion;
 pub(crate) mod passes;
 mod poses;
 pub(crate) mod random;
@@ -134,6 +135,10 @@ pub(crate) fn trials(kernel: Kernel, random: &mut Random) -> Vec<Trial> {
         | Kernel::CrowdWholeMatrices
         | Kernel::CrowdPlainWholeMatrices
         | Kernel::CrowdSubgroupRotations => whole_instances::trials(kernel, random),
+        Kernel::MotionJoints
+        | Kernel::MotionWalk
+        | Kernel::MotionDifferences
+        | Kernel::MotionStore => motion::trials(kernel, random),
         _ => segments::trials(kernel, random),
     }
 }
@@ -145,11 +150,13 @@ pub(crate) fn check(kernel: Kernel, pipeline: &Pipeline) -> Result<KernelCheck, 
         total: 0,
         differing: 0,
         remembered: false,
+        replaced: false,
     };
     for trial in trials(kernel, &mut Random::canonical()) {
         let [differing, total] = trial.differing(kernel, pipeline)?;
         check.differing += differing;
         check.total += total;
     }
+    check.replaced = check.differing > 0 && kernel.is_replaceable();
     Ok(check)
 }

@@ -11,13 +11,15 @@ use crate::shader::{
 use crate::twin::Evaluate;
 use crate::twin::arc_between::arc_between;
 use crate::work::lists::WorkChunk;
-use crate::work::lists::spread::{NO_RUN, RunRepetitions, SpreadLanes};
+use crate::work::lists::spread::{LaneAxis, NO_RUN, RunRepetitions, SpreadLanes};
 
 use super::random::Random;
 use super::{Trial, bytes, groups};
 
 const SEGMENTS: usize = 24;
 const CONSTANTS: usize = 6;
+/// Tracks of runs that lanes evaluate track by track: those of eight lanes, and some more.
+const TRACKS: u32 = 11;
 
 /// A form of segments.
 trait Segment: Evaluate {
@@ -72,8 +74,10 @@ pub(super) fn trials(kernel: Kernel, random: &mut Random) -> Vec<Trial> {
 
 fn of_form<S: Segment>(list: List, store: Store, random: &mut Random) -> Vec<Trial> {
     let encodings = Encoding::of_store(store);
-    // Use two shapes of dispatches, and every encoding at least once.
-    (0..encodings.len().max(2))
+    // Each shape of a dispatch, and every encoding at least once.
+    let is_spread = matches!(list, List::FramesSpread | List::TimesSpread);
+    let shapes = if is_spread { 3 } else { 2 };
+    (0..encodings.len().max(shapes))
         .map(|i| {
             let scene = SegmentInputs::<S>::new(random, encodings[i % encodings.len()]);
             let first = i % 2 == 0;
@@ -84,9 +88,11 @@ fn of_form<S: Segment>(list: List, store: Store, random: &mut Random) -> Vec<Tri
                 List::FramesCoalesced => scene.frame_by_frame(random, false),
                 List::TimesCoalesced => scene.frame_by_frame(random, true),
                 List::FramesSpread | List::TimesSpread => {
-                    let lanes_log2 = random.below(2) + if first { 2 } else { 4 };
-                    let lanes = SpreadLanes::new(lanes_log2);
-                    let repetitions = if first { 1 } else { 3 };
+                    let (lanes, repetitions) = match i % 3 {
+                        0 => (SpreadLanes::new(2 + random.below(2)), 1),
+                        1 => (SpreadLanes::new(4 + random.below(2)), 3),
+                        _ => (SpreadLanes::of_tracks(TRACKS, 0, TRACKS + 2), TRACKS),
+                    };
                     let is_listed = matches!(list, List::TimesSpread);
                     scene.spread(random, is_listed, lanes, repetitions)
                 }
@@ -312,8 +318,8 @@ impl<S: Segment> SegmentInputs<S> {
         self.finish(listed, &grid, groups)
     }
 
-    /// Runs of contiguous samples, between some of which there are samples of no run; each run has a number of lanes.
-    /// Each repetition is of segments and constants further on.
+    /// Runs of consecutive samples, between some of which there are samples of no run; each run has a number of lanes.
+    /// Each repetition is of segments and constants further on. Frame by frame, repetitions are tracks.
     fn spread(
         mut self,
         random: &mut Random,
@@ -321,8 +327,11 @@ impl<S: Segment> SegmentInputs<S> {
         lanes: SpreadLanes,
         count: u32,
     ) -> Trial {
-        const RUNS: usize = 60;
         const FIRST: u32 = 3;
+        let (runs, stride) = match lanes.axis() {
+            LaneAxis::Samples => (60, 1),
+            LaneAxis::Tracks { stride } => (10, stride),
+        };
         let mut repetitions = RunRepetitions {
             count,
             segments: 2,
@@ -336,11 +345,11 @@ impl<S: Segment> SegmentInputs<S> {
         }
         let mut chunk = WorkChunk::default();
         let mut output = 0;
-        for _ in 0..RUNS {
+        for _ in 0..runs {
             let max = if random.once_in(8) { 150 } else { 40 };
             let length = 1 + random.below(max);
             let count = length - random.below(3).min(length - 1);
-            self.item(random, is_listed, output, count);
+            self.item(random, is_listed, output * stride, count);
             chunk.runs.extend(
                 self.items
                     .pop()
@@ -348,17 +357,17 @@ impl<S: Segment> SegmentInputs<S> {
             );
             output += length;
         }
-        repetitions.outputs = output + 1;
+        repetitions.outputs = if stride == 1 { output + 1 } else { 1 };
         let mut list = vec![NO_RUN; lanes.entries(&chunk)];
         lanes.write_chunk(&chunk, 0, &mut list);
         // The first entry belongs to another dispatch, so this one must not evaluate it.
         let entries = list.len() as u32;
         list.insert(0, SpreadRun { count: 9, ..NO_RUN });
         let dispatch = lanes.dispatch_repeated([1, entries], repetitions, self.detail(), FIRST);
-        let [workgroups, ..] = lanes.workgroups(entries);
+        let groups = lanes.workgroups(entries, count);
         let mut listed = vec![bytes(&list)];
         listed.extend(is_listed.then(|| bytes(&self.distances)));
-        self.finish(listed, &dispatch, [2, workgroups.div_ceil(2), count])
+        self.finish(listed, &dispatch, groups)
     }
 
     /// The run of an item, which may begin with a key; in frames far from the middle, it says so.

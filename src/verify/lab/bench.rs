@@ -129,8 +129,8 @@ impl ListedRuns {
             lanes, repetitions, ..
         } = *self;
         let push = lanes.dispatch_repeated([0, self.entries], repetitions, detail, 0);
-        let [x, y, _] = lanes.workgroups(self.entries);
-        (push, [x, y, repetitions.count])
+        let groups = lanes.workgroups(self.entries, repetitions.count);
+        (push, groups)
     }
 }
 

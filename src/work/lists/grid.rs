@@ -1,5 +1,5 @@
 //! The grid of a window whose samples are stored frame by frame, for devices on which neighbouring invocations evaluate
-//! neighbouring tracks. Blocks of samples specify the item of each sample, so that no search is needed.
+//! neighbouring tracks, if the tracks have different runs. Blocks of samples specify the item of each sample, so that no search is needed.
 
 use std::ops::Range;
 

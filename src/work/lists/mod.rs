@@ -72,8 +72,8 @@ impl Work {
                     let entries = [group.first_item, group.items];
                     let first = group.first_output + stored.first;
                     let dispatch = lanes.dispatch_repeated(entries, repetitions, detail, first);
-                    let [x, y, _] = lanes.workgroups(group.items);
-                    recording.dispatch(set, &dispatch, [x, y, repetitions.count]);
+                    let workgroups = lanes.workgroups(group.items, repetitions.count);
+                    recording.dispatch(set, &dispatch, workgroups);
                     continue;
                 }
             }
@@ -154,7 +154,7 @@ pub(crate) enum WorkShape {
     Alone,
     /// Neighbours evaluate neighbouring tracks.
     Grid(GroupGrid),
-    /// Neighbours evaluate neighbouring samples of a run.
+    /// Neighbours evaluate neighbouring samples of a run, or the same run of neighbouring tracks.
     Spread(SpreadLanes, RunRepetitions),
 }
 
@@ -248,6 +248,11 @@ impl Lister {
             return self.list_spread(request, window, memory);
         }
         let mut rows = GridRows::new(window).filter(|_| maps_samples);
+        if rows.is_some()
+            && let Some(shared) = SharedRuns::new(request, window)?
+        {
+            return shared.write(memory);
+        }
         let (mut lists, mut grids) = (Vec::new(), Vec::new());
         if let Some(rows) = rows {
             lists = work(clip, timeline, window, Cut::Whole, &mut self.spare)?;

@@ -1,6 +1,7 @@
 //! Spread runs of tracks with the same key times, which most clips have: the list has the runs of a few tracks, and is
 //! repeated for all others. So the device reads a few kilobytes of lists instead of megabytes, and the host makes the
-//! runs of one track.
+//! runs of one track. Frame by frame the list has the runs of one track, and each lane of a run evaluates another
+//! repetition.
 //!
 //! Tracks with the same times have the same runs; what differs is which segment, constant and part of the result a run
 //! is of, and these are as far from track to track as from the first to the second. This is looked up in what was
@@ -10,9 +11,10 @@ use std::iter::zip;
 
 use rayon::prelude::*;
 
+use crate::output::rotations::Layout;
 use crate::output::window::Window;
 use crate::prepare::prepared::Prepared;
-use crate::shader::{IS_CONSTANT, List, NEEDS_CARE, NO_KEY, SpreadRun};
+use crate::shader::{IS_CONSTANT, LINE, List, NEEDS_CARE, NO_KEY, SpreadRun};
 use crate::time::error::SampleTimesError;
 use crate::time::frames::Ticks;
 use crate::time::runs::NONE;
@@ -26,8 +28,11 @@ use crate::work::lists::{
 /// The tracks from which on a list is repeated rather than written for each.
 const LEAST_TRACKS: u32 = 64;
 
-/// The layers of workgroups that every device dispatches.
-const MAX_REPETITIONS: u32 = 65_535;
+/// The same frame by frame: as many as store a line of rotations together.
+const LEAST_TRACKS_OF_FRAME: u32 = LINE;
+
+/// The workgroups along any axis that every device dispatches.
+const MAX_WORKGROUPS: u32 = 65_535;
 
 /// The maximum number of tracks in a list that is repeated.
 const MAX_TRACKS: u32 = 32;
@@ -109,7 +114,7 @@ struct SharedGroup {
     group: usize,
     tracks: u32,
     stride: TrackStride,
-    /// The values of a track in the result.
+    /// How far the values of a track are from those of the track before.
     outputs: u32,
     /// The runs of the first track.
     first: WorkChunk,
@@ -126,7 +131,11 @@ impl SharedGroup {
         let tracks = parts.len() as u32;
         // Tracks that repeat have different runs in each copy, so they are listed separately.
         let is_plain = |part: &TrackPart| part.extension.is_none();
-        let ([first, second, ..], true) = (parts, tracks >= LEAST_TRACKS) else {
+        let least = match window.layout {
+            Layout::TrackMajor => LEAST_TRACKS,
+            Layout::FrameMajor => LEAST_TRACKS_OF_FRAME,
+        };
+        let ([first, second, ..], true) = (parts, tracks >= least) else {
             return Ok(None);
         };
         let stride = TrackStride::between(prepared, first, second);
@@ -135,12 +144,18 @@ impl SharedGroup {
         if !all.all(fits) {
             return Ok(None);
         }
-        let list = PartsList::of_runs((prepared, &parts[..1]), request.timeline, window);
+        let track = first.track as usize;
+        let of_track = Window::of(track..track + 1, window.samples.clone(), Layout::TrackMajor);
+        let list = PartsList::of_runs((prepared, &parts[..1]), request.timeline, &of_track);
         let mut first = list.list()?;
         if !first.patches.is_empty() {
             return Ok(None);
         }
-        // A run stands for several tracks, so a component of any of them may be tiny.
+        for run in &mut first.runs {
+            let sample = window.samples.start + run.output as usize;
+            run.output = window.offset(track, sample) as u32;
+        }
+        // A component of any track may be tiny.
         first.runs.par_iter_mut().for_each(|run| {
             let segment = |track: u32| run.source.wrapping_add(stride.segments.wrapping_mul(track));
             if run.count & (IS_CONSTANT | NEEDS_CARE) == 0
@@ -153,7 +168,10 @@ impl SharedGroup {
             group,
             tracks,
             stride,
-            outputs: window.samples.len() as u32,
+            outputs: match window.layout {
+                Layout::TrackMajor => window.samples.len() as u32,
+                Layout::FrameMajor => 1,
+            },
             first,
         }))
     }
@@ -168,7 +186,7 @@ impl SharedGroup {
             let entries = used.next_multiple_of(lanes.runs_of_workgroup());
             8 * (entries - used) <= entries
                 && tracks * 4 <= self.tracks
-                && self.tracks / tracks <= MAX_REPETITIONS
+                && self.tracks / tracks <= MAX_WORKGROUPS
         })
     }
 
@@ -199,8 +217,10 @@ impl SharedGroup {
         }
     }
 
-    /// Its lists: what is repeated, and what is left of its tracks.
-    fn lists(&self, tracks: u32) -> [(WorkChunk, RunRepetitions); 2] {
+    /// Its lists: of some tracks, repeated, and of what is left of its tracks. `None` as in
+    /// [`SharedGroup::tracks_of_list`].
+    fn lists_of_tracks(&self, lanes: SpreadLanes) -> Option<Vec<SharedList>> {
+        let tracks = self.tracks_of_list(lanes)?;
         let count = self.tracks / tracks;
         let repetitions = RunRepetitions {
             count,
@@ -209,19 +229,54 @@ impl SharedGroup {
             outputs: tracks * self.outputs,
         };
         let done = count * tracks;
-        [
+        let all = [
             (self.runs(0, tracks), repetitions),
             (self.runs(done, self.tracks - done), RunRepetitions::ONE),
-        ]
+        ];
+        let lists = all.into_iter().map(|(chunk, repetitions)| SharedList {
+            group: self.group,
+            lanes,
+            chunk,
+            repetitions,
+        });
+        Some(lists.filter(|list| !list.chunk.runs.is_empty()).collect())
     }
+
+    /// Its list frame by frame: the runs of the first track, repeated for each. `None` if it needs more workgroups than
+    /// every device dispatches.
+    fn list_of_frames(self, window: &Window) -> Option<SharedList> {
+        let samples = window.samples.len() as u32;
+        let lanes = SpreadLanes::of_tracks(self.tracks, samples, window.stride() as u32);
+        let repetitions = RunRepetitions {
+            count: self.tracks,
+            segments: self.stride.segments,
+            constants: self.stride.constants,
+            outputs: self.outputs,
+        };
+        let entries = lanes.entries(&self.first) as u32;
+        let workgroups = lanes.workgroups(entries, repetitions.count);
+        let list = SharedList {
+            group: self.group,
+            lanes,
+            chunk: self.first,
+            repetitions,
+        };
+        (workgroups.iter().all(|&count| count <= MAX_WORKGROUPS)).then_some(list)
+    }
+}
+
+/// Runs of a group, and how often they are evaluated.
+struct SharedList {
+    group: usize,
+    lanes: SpreadLanes,
+    chunk: WorkChunk,
+    repetitions: RunRepetitions,
 }
 
 /// The lists of a window whose tracks have the same key times.
 pub(super) struct SharedRuns {
     list: List,
-    lanes: SpreadLanes,
-    /// Each list with the group that it is of.
-    lists: Vec<(usize, WorkChunk, RunRepetitions)>,
+    lists: Vec<SharedList>,
     distances: Vec<f32>,
 }
 
@@ -252,10 +307,12 @@ impl SharedRuns {
             counts = Some(counts.map_or(of_group, |counts| counts.and(of_group)));
             groups.push(group);
         }
-        let Some(counts) = counts.filter(|counts| !counts.are_too_short()) else {
+        let Some(counts) = counts else {
             return Ok(None);
         };
-        let lanes = SpreadLanes::of_runs(counts, request.run_lanes);
+        if window.layout == Layout::TrackMajor && counts.are_too_short() {
+            return Ok(None);
+        }
         let (mut lists, mut distances) = (Vec::new(), Vec::new());
         for mut group in groups {
             // With explicit times, a run contains the index of its first distance.
@@ -266,16 +323,19 @@ impl SharedRuns {
                 }
                 distances.append(&mut group.first.distances);
             }
-            let Some(tracks) = group.tracks_of_list(lanes) else {
+            let of_group = match window.layout {
+                Layout::TrackMajor => {
+                    group.lists_of_tracks(SpreadLanes::of_runs(counts, request.run_lanes))
+                }
+                Layout::FrameMajor => group.list_of_frames(window).map(|list| vec![list]),
+            };
+            let Some(of_group) = of_group else {
                 return Ok(None);
             };
-            let of_group = group.lists(tracks).into_iter();
-            let filled = of_group.filter(|(chunk, _)| !chunk.runs.is_empty());
-            lists.extend(filled.map(|(chunk, repetitions)| (group.group, chunk, repetitions)));
+            lists.extend(of_group);
         }
         Ok(Some(Self {
             list: spread_list(timeline),
-            lanes,
             lists,
             distances,
         }))
@@ -283,17 +343,16 @@ impl SharedRuns {
 
     /// Writes the lists into a device's memory.
     pub(super) fn write<'r, R: ListRoom<'r>>(self, memory: R) -> Result<Work, R::Error> {
-        let Self { list, lanes, .. } = self;
         let mut first_item = 0;
-        let groups = self.lists.iter().map(|(group, chunk, repetitions)| {
-            let items = lanes.entries(chunk) as u32;
+        let groups = self.lists.iter().map(|list| {
+            let items = list.lanes.entries(&list.chunk) as u32;
             first_item += items;
             GroupItems {
-                group: *group,
+                group: list.group,
                 first_item: first_item - items,
                 items,
                 first_output: 0,
-                shape: WorkShape::Spread(lanes, *repetitions),
+                shape: WorkShape::Spread(list.lanes, list.repetitions),
             }
         });
         let groups = groups.collect();
@@ -304,14 +363,14 @@ impl SharedRuns {
         ];
         let [runs, distances, _] = memory.room(sizes)?;
         let mut runs: &mut [SpreadRun] = bytemuck::cast_slice_mut(runs);
-        for (_, chunk, _) in &self.lists {
+        for SharedList { lanes, chunk, .. } in &self.lists {
             let (of_chunk, others) = runs.split_at_mut(lanes.entries(chunk));
             lanes.write_chunk(chunk, 0, of_chunk);
             runs = others;
         }
         bytemuck::cast_slice_mut(distances).copy_from_slice(&self.distances);
         Ok(Work {
-            list,
+            list: self.list,
             groups,
             patches: Vec::new(),
         })
@@ -357,10 +416,11 @@ mod tests {
     /// The source of a sample: a constant; or a segment, the distance from its middle, scale and offset.
     type Source = (bool, u32, i32, [u32; 2]);
 
-    /// The source of every sample, and whether it needs care.
+    /// The source of every sample, and whether it needs care. The samples of a track are so far from each other.
     fn sources(
         runs: impl Iterator<Item = SpreadRun>,
         samples: usize,
+        stride: u32,
     ) -> Vec<Option<(Source, bool)>> {
         let mut all = vec![None; samples];
         for run in runs {
@@ -373,12 +433,9 @@ mod tests {
                     let affine = [run.scale, run.offset].map(f32::to_bits);
                     (false, run.source, run.first + j as i32, affine)
                 };
-                let of_sample = &mut all[(run.output + j) as usize];
-                assert!(
-                    of_sample.is_none(),
-                    "sample {} has two runs",
-                    run.output + j
-                );
+                let output = run.output + j * stride;
+                let of_sample = &mut all[output as usize];
+                assert!(of_sample.is_none(), "sample {output} has two runs");
                 *of_sample = Some((source, run.count & NEEDS_CARE != 0));
             }
         }
@@ -387,10 +444,10 @@ mod tests {
 
     /// The runs of all repetitions.
     fn repeated(shared: &SharedRuns) -> impl Iterator<Item = SpreadRun> {
-        let lists = shared.lists.iter();
-        lists.flat_map(|(_, chunk, repetitions)| {
+        shared.lists.iter().flat_map(|list| {
+            let repetitions = list.repetitions;
             (0..repetitions.count).flat_map(move |number| {
-                chunk.runs.iter().map(move |run| {
+                list.chunk.runs.iter().map(move |run| {
                     let constants = number * repetitions.constants;
                     let segments = number * repetitions.segments;
                     let is_constant = run.count & IS_CONSTANT != 0;
@@ -409,8 +466,8 @@ mod tests {
         })
     }
 
-    /// Keys on frames and off them, steps, cubics, listed times, and parts of a result: what is repeated gives every
-    /// sample from the source that the list of all tracks names.
+    /// Keys on frames and off them, steps, cubics, listed times, and parts of a result in either layout: what is repeated
+    /// gives every sample from the source that the list of all tracks names.
     #[test]
     fn repeated_lists_give_what_lists_of_all_tracks_give() {
         let on_frames = Vec::from_iter((0..26).map(|i| 0.8 * f64::from(i)));
@@ -434,35 +491,42 @@ mod tests {
                 timeline,
             };
             for (tracks, part) in [(0..205, 0..samples), (7..201, 100..700)] {
-                let window = Window::of(tracks, part, Layout::TrackMajor);
-                let shared = SharedRuns::new(request, &window).unwrap();
-                let shared = shared.unwrap_or_else(|| panic!("{method}"));
-                let lists = work(clip, timeline, &window, Cut::Spread, &mut Vec::new()).unwrap();
+                let of_layout = |layout| Window::of(tracks.clone(), part.clone(), layout);
+                let by_track = of_layout(Layout::TrackMajor);
+                let lists = work(clip, timeline, &by_track, Cut::Spread, &mut Vec::new()).unwrap();
                 let all = lists.iter().flat_map(|list| &list.chunks);
                 let distance = |chunk: &WorkChunk| chunk.distances.clone();
-                let [all_distances, distances] = [
-                    all.clone().flat_map(distance).collect(),
-                    shared.distances.clone(),
-                ];
+                let all_distances: Vec<f32> = all.clone().flat_map(distance).collect();
                 let all = all.flat_map(|chunk| &chunk.runs).copied();
-                let expected = sources(all, window.len());
-                let found = sources(repeated(&shared), window.len());
-                for (index, (found, expected)) in zip(found, expected).enumerate() {
-                    let (Some((mut found, care)), Some((mut expected, needs_care))) =
-                        (found, expected)
-                    else {
-                        panic!("{method}: sample {index}: {found:?}, {expected:?}");
-                    };
-                    assert!(care || !needs_care);
-                    // With listed times, the indices may differ, but the distances must be equal. Keys have no
-                    // distance.
-                    if !distances.is_empty() && !found.0 && !expected.0 {
-                        let of =
-                            |list: &Vec<f32>, index: i32| list[index as usize].to_bits() as i32;
-                        found.2 = of(&distances, found.2);
-                        expected.2 = of(&all_distances, expected.2);
+                let all = sources(all, by_track.len(), 1);
+                for layout in [Layout::TrackMajor, Layout::FrameMajor] {
+                    let window = of_layout(layout);
+                    let shared = SharedRuns::new(request, &window).unwrap();
+                    let shared = shared.unwrap_or_else(|| panic!("{method}, {layout:?}"));
+                    let distances = &shared.distances;
+                    let stride = window.stride() as u32;
+                    let found = sources(repeated(&shared), window.len(), stride);
+                    for track in tracks.clone() {
+                        for sample in part.clone() {
+                            let found = found[window.offset(track, sample)];
+                            let expected = all[by_track.offset(track, sample)];
+                            let (Some((mut found, care)), Some((mut expected, needs_care))) =
+                                (found, expected)
+                            else {
+                                panic!("{method}: {track}, {sample}: {found:?}, {expected:?}");
+                            };
+                            assert!(care || !needs_care, "{method}: {track}, {sample}");
+                            // Of listed times, the distances are equal, not their indices; keys have none.
+                            if !distances.is_empty() && !found.0 && !expected.0 {
+                                let of = |list: &[f32], index: i32| {
+                                    list[index as usize].to_bits() as i32
+                                };
+                                found.2 = of(distances, found.2);
+                                expected.2 = of(&all_distances, expected.2);
+                            }
+                            assert_eq!(found, expected, "{method}, {layout:?}: {track}, {sample}");
+                        }
                     }
-                    assert_eq!(found, expected, "{method}: sample {index}");
                 }
             }
         }
@@ -482,12 +546,22 @@ mod tests {
             clip,
             timeline,
         };
+        let bytes = |shared: &SharedRuns| {
+            let lists = shared.lists.iter();
+            let entries = lists.map(|list| list.lanes.entries(&list.chunk));
+            Vec::from_iter(entries.map(|entries| entries * size_of::<SpreadRun>()))
+        };
         let shared = SharedRuns::new(request, &window).unwrap().unwrap();
-        let entries = shared.lists.iter();
-        let entries =
-            entries.map(|(_, chunk, _)| shared.lanes.entries(chunk) * size_of::<SpreadRun>());
-        assert_eq!(Vec::from_iter(entries), [3_584]);
-        assert_eq!(shared.lists[0].2.count, 1024);
+        assert_eq!(bytes(&shared), [3_584]);
+        assert_eq!(shared.lists[0].repetitions.count, 1024);
+        // Frame by frame one track of runs of 48 frames, each in two pieces, and a workgroup for 128 tracks.
+        let by_frames = Window::whole(4096, timeline.len(), Layout::FrameMajor);
+        let shared = SharedRuns::new(request, &by_frames).unwrap().unwrap();
+        assert_eq!(bytes(&shared), [1_600]);
+        let SharedList {
+            lanes, repetitions, ..
+        } = shared.lists[0];
+        assert_eq!(lanes.workgroups(50, repetitions.count), [50, 1, 32]);
         let lists = work(clip, timeline, &window, Cut::Spread, &mut Vec::new()).unwrap();
         let runs: usize = lists[0].chunks.iter().map(|chunk| chunk.runs.len()).sum();
         assert_eq!(runs * size_of::<SpreadRun>(), 3_276_800);
@@ -520,6 +594,10 @@ mod tests {
                 timeline,
             };
             assert!(SharedRuns::new(request, &window).unwrap().is_none());
+            // Frame by frame 63 tracks are enough.
+            let by_frames = Window::whole(clip.track_count(), timeline.len(), Layout::FrameMajor);
+            let shared = SharedRuns::new(request, &by_frames).unwrap();
+            assert_eq!(shared.is_some(), clip.track_count() == 63);
         }
     }
 }

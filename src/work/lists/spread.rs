@@ -1,5 +1,6 @@
 //! Spread runs: the list of a window for devices on which neighbouring invocations evaluate a run together. A power of
-//! two of invocations, the lanes of a run, take its samples in turn.
+//! two of invocations, the lanes of a run, take its samples in turn; frame by frame each takes those of a track
+//! ([`LaneAxis`]).
 //!
 //! A wave of 32 or 64 invocations has several runs, and goes on until the longest one ends. So long runs are cut, and
 //! runs near each other in the list are put in order of their iterations. Their order in the list is free, because each
@@ -14,6 +15,9 @@ use crate::work::lists::{GroupWork, WorkChunk};
 /// The maximum number of iterations of a run. With 16 a run of 200 samples began twice, which took a twelfth of its
 /// instructions.
 const MAX_ITERATIONS: u32 = 32;
+
+/// The invocations that a large card runs at once.
+const FULL_CARD: u64 = 1 << 17;
 
 /// Runs that are put in order of their iterations; whole workgroups with any number of lanes.
 const ORDERED_RUNS: usize = 128;
@@ -74,6 +78,16 @@ impl RunCounts {
     }
 }
 
+/// The neighbours in the result, which the lanes of a run store together.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum LaneAxis {
+    /// Samples of a track: each lane evaluates some samples of a run.
+    Samples,
+    /// Tracks with the same runs, frame by frame: each lane evaluates a whole run of its track. Its samples are so far
+    /// from each other in the result.
+    Tracks { stride: u32 },
+}
+
 /// How often the entries of a list are evaluated, and how much further on each time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct RunRepetitions {
@@ -93,18 +107,24 @@ impl RunRepetitions {
     };
 }
 
-/// The number of lanes of a run, a power of two from 4 to 32, and the invocations of a workgroup.
+/// The number of lanes of a run, a power of two, and the invocations of a workgroup.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct SpreadLanes {
     log2: u32,
     workgroup: u32,
+    axis: LaneAxis,
+    /// The maximum number of iterations of an entry.
+    max_iterations: u32,
 }
 
 impl SpreadLanes {
+    /// Lanes with neighbouring samples, 4 to 32.
     pub(crate) fn new(log2: u32) -> Self {
         Self {
             log2,
             workgroup: SPREAD_WORKGROUP,
+            axis: LaneAxis::Samples,
+            max_iterations: MAX_ITERATIONS,
         }
     }
 
@@ -120,13 +140,52 @@ impl SpreadLanes {
         Self::new(run_lanes.of_class(class).ilog2())
     }
 
+    /// Lanes with neighbouring tracks, of which there are so many with so many samples each: the most of which at most an
+    /// eighth has no track, from a line of rotations up to a workgroup.
+    pub(crate) fn of_tracks(tracks: u32, samples: u32, stride: u32) -> Self {
+        let is_used = |log2: &u32| {
+            let lanes = tracks.next_multiple_of(1 << log2);
+            8 * (lanes - tracks) <= lanes
+        };
+        let mut sizes = (LINE.ilog2()..=SPREAD_WORKGROUP.ilog2()).rev();
+        // Runs are cut until the dispatch has as many invocations as a large card runs at once, but not so short that
+        // their beginnings would take longer than their samples.
+        let samples_each = u64::from(tracks) * u64::from(samples) / FULL_CARD;
+        Self {
+            log2: sizes.find(is_used).unwrap_or(LINE.ilog2()),
+            workgroup: SPREAD_WORKGROUP,
+            axis: LaneAxis::Tracks { stride },
+            max_iterations: samples_each.clamp(8, MAX_ITERATIONS.into()) as u32,
+        }
+    }
+
+    pub(crate) fn axis(self) -> LaneAxis {
+        self.axis
+    }
+
     fn lanes(self) -> u32 {
         1 << self.log2
     }
 
-    /// The lanes that store a line of memory together, less one.
+    /// The number of lanes with neighbouring samples, as a power of two.
+    fn sample_lanes_log2(self) -> u32 {
+        match self.axis {
+            LaneAxis::Samples => self.log2,
+            LaneAxis::Tracks { .. } => 0,
+        }
+    }
+
+    /// The distance in the result between neighbouring samples of a track.
+    fn stride(self) -> u32 {
+        match self.axis {
+            LaneAxis::Samples => 1,
+            LaneAxis::Tracks { stride } => stride,
+        }
+    }
+
+    /// The lanes that store a line of memory of samples together, less one.
     fn line_mask(self) -> u32 {
-        self.lanes().min(LINE) - 1
+        (1 << self.sample_lanes_log2()).min(LINE) - 1
     }
 
     pub(crate) fn runs_of_workgroup(self) -> usize {
@@ -135,16 +194,29 @@ impl SpreadLanes {
 
     /// The iterations of a run, wherever in a line it begins.
     fn iterations(self, samples: u32) -> u32 {
-        (samples + self.line_mask()).div_ceil(self.lanes())
+        (samples + self.line_mask()).div_ceil(1 << self.sample_lanes_log2())
+    }
+
+    /// The number of samples of the pieces into which a run is cut; the last one may have fewer. Those of tracks are about
+    /// as long as each other, so that none is short.
+    fn piece_samples(self, run: &SpreadRun) -> u32 {
+        let most = self.max_iterations << self.sample_lanes_log2();
+        match self.axis {
+            LaneAxis::Samples => most,
+            LaneAxis::Tracks { .. } => {
+                let count = sample_count(run).max(1);
+                count.div_ceil(count.div_ceil(most))
+            }
+        }
     }
 
     /// The pieces into which a run is cut.
     fn pieces(self, run: &SpreadRun) -> impl Iterator<Item = SpreadRun> + use<> {
-        let (run, count, each) = (*run, sample_count(run), MAX_ITERATIONS * self.lanes());
+        let (run, count, each) = (*run, sample_count(run), self.piece_samples(run));
         (0..count)
             .step_by(each as usize)
             .map(move |done| SpreadRun {
-                output: run.output + done,
+                output: run.output + done * self.stride(),
                 count: (count - done).min(each) | (run.count & (IS_CONSTANT | NEEDS_CARE)),
                 first: run.first.wrapping_add(done as i32),
                 key: if done == 0 { run.key } else { NO_KEY },
@@ -155,8 +227,7 @@ impl SpreadLanes {
 
     /// The number of pieces of a chunk's runs.
     pub(crate) fn piece_count(self, chunk: &WorkChunk) -> usize {
-        let each = MAX_ITERATIONS * self.lanes();
-        let pieces = |run| sample_count(run).div_ceil(each) as usize;
+        let pieces = |run: &SpreadRun| sample_count(run).div_ceil(self.piece_samples(run)) as usize;
         chunk.runs.iter().map(pieces).sum()
     }
 
@@ -236,16 +307,32 @@ impl SpreadLanes {
             item_count: count,
             first_output: output,
             lanes_log2: self.log2,
+            sample_mask: (1 << self.sample_lanes_log2()) - 1,
+            track_mask: self.layer_repetitions() - 1,
+            step: 1 << self.sample_lanes_log2(),
+            step_log2: self.sample_lanes_log2(),
+            stride: self.stride(),
             line_mask: self.line_mask(),
+            repetitions: repetitions.count,
+            layer_repetitions: self.layer_repetitions(),
             segments: repetitions.segments,
             constants: repetitions.constants,
             outputs: repetitions.outputs,
         }
     }
 
-    /// The workgroups of a dispatch.
-    pub(crate) fn workgroups(self, entries: u32) -> [u32; 3] {
-        [(entries << self.log2).div_ceil(self.workgroup), 1, 1]
+    /// The repetitions of a layer of workgroups.
+    fn layer_repetitions(self) -> u32 {
+        match self.axis {
+            LaneAxis::Samples => 1,
+            LaneAxis::Tracks { .. } => self.lanes(),
+        }
+    }
+
+    /// The workgroups of a dispatch over entries that are repeated so often.
+    pub(crate) fn workgroups(self, entries: u32, repetitions: u32) -> [u32; 3] {
+        let of_layer = (entries << self.log2).div_ceil(self.workgroup);
+        [of_layer, 1, repetitions.div_ceil(self.layer_repetitions())]
     }
 }
 
@@ -258,8 +345,10 @@ mod tests {
     #[test]
     fn entries_have_the_samples_of_all_runs() {
         let mut random = fastrand::Rng::with_seed(7);
-        for log2 in 2..=5 {
-            let lanes = SpreadLanes::new(log2);
+        let of_tracks =
+            [(11, 9), (100, 300), (4096, 1200)].map(|(n, m)| SpreadLanes::of_tracks(n, m, n + 2));
+        for lanes in (2..=5).map(SpreadLanes::new).chain(of_tracks) {
+            let stride = lanes.stride();
             let mut chunk = WorkChunk::default();
             let mut output = 5;
             for source in 0..300 {
@@ -275,7 +364,7 @@ mod tests {
                     key,
                     ..NO_RUN
                 });
-                output += count + random.u32(..3);
+                output += (count + random.u32(..3)) * stride;
             }
             let mut list = vec![NO_RUN; lanes.entries(&chunk)];
             lanes.write_chunk(&chunk, 1000, &mut list);
@@ -298,7 +387,7 @@ mod tests {
                 while done < count {
                     let piece = entries.next().unwrap();
                     let expected = SpreadRun {
-                        output: run.output + done,
+                        output: run.output + done * stride,
                         first: run.first + 1000 + done as i32,
                         key: if done == 0 { run.key } else { NO_KEY },
                         count: piece.count,
@@ -314,5 +403,35 @@ mod tests {
             }
             assert!(entries.next().is_none());
         }
+    }
+
+    /// Hardly a lane has no track, and a card is filled if there are samples enough.
+    #[test]
+    fn lanes_are_as_many_as_tracks_fill() {
+        let lanes = |tracks, samples| {
+            let lanes = SpreadLanes::of_tracks(tracks, samples, tracks);
+            (lanes.lanes(), lanes.max_iterations)
+        };
+        assert_eq!(lanes(4096, 1200), (128, 32));
+        assert_eq!(lanes(509, 1200), (128, 8));
+        for (tracks, expected) in [
+            (8, 8),
+            (9, 8),
+            (24, 8),
+            (30, 32),
+            (60, 64),
+            (65, 8),
+            (80, 16),
+        ] {
+            assert_eq!(lanes(tracks, 1 << 16).0, expected, "{tracks} tracks");
+        }
+        assert_eq!(lanes(60, 1 << 15).1, 15);
+        let run = |count| SpreadRun { count, ..NO_RUN };
+        let pieces = |count| {
+            let pieces = SpreadLanes::of_tracks(4096, 1200, 4096).pieces(&run(count));
+            Vec::from_iter(pieces.map(|piece| piece.count))
+        };
+        assert_eq!(pieces(48), [24, 24]);
+        assert_eq!(pieces(65), [22, 22, 21]);
     }
 }

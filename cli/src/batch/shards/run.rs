@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 use tumble_formats::folder::Folder;
 use tumble_formats::format::Format;
-use tumble_formats::output::{Output, remove_marked};
+use tumble_formats::output::{Output, remove_abandoned_marked};
 
 use crate::batch::entry::{InputEntry, ManifestEntry, PreviousEntries, ResultRecorder};
 use crate::batch::output_plan::ResultFolder;
@@ -69,7 +69,7 @@ impl<'a> Shard<'a> {
     }
 
     /// The work: each input with its target. Inputs whose results cannot have a file are recorded as
-    /// failed. Temporary files of an earlier attempt are removed.
+    /// failed. Temporary files of an attempt that was killed are removed; another worker may make the same shard.
     pub(crate) fn jobs(
         &mut self,
         paths: impl Iterator<Item = PathBuf>,
@@ -100,7 +100,7 @@ impl<'a> Shard<'a> {
             }
         }
         for folder in &result_folder.made {
-            remove_marked(folder, &mark);
+            remove_abandoned_marked(folder, &mark);
         }
         jobs
     }

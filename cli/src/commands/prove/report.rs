@@ -122,6 +122,9 @@ pub(crate) struct KernelSection {
     pub(crate) values: u64,
     /// Those whose bits differ.
     pub(crate) differing: Vec<DifferingValues>,
+    /// Those whose bits differ, and in whose place the engine uses others.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub(crate) replaced: Vec<DifferingValues>,
     /// The names of those that did not run.
     pub(crate) missing: Vec<String>,
 }

@@ -334,7 +334,11 @@ impl ProofRun<'_> {
                 if ran.insert(check.name) {
                     kernels.values += check.total as u64;
                     if check.differing > 0 {
-                        kernels.differing.push(DifferingValues {
+                        let differing = match check.replaced {
+                            true => &mut kernels.replaced,
+                            false => &mut kernels.differing,
+                        };
+                        differing.push(DifferingValues {
                             name: check.name.to_owned(),
                             values: check.total as u64,
                             differing: check.differing as u64,

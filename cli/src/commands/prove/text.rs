@@ -134,6 +134,13 @@ fn bits(proof: &Proof, text: &mut String) {
         grouped(kernels.values),
         kernels.differing.len()
     );
+    for replaced in &kernels.replaced {
+        let _ = writeln!(
+            text,
+            "                    {} differs in {} of {} values: others are used in its place",
+            replaced.name, replaced.differing, replaced.values
+        );
+    }
     let control = &proof.negative_control;
     let _ = match (control.has_run, control.differing) {
         (false, _) => writeln!(text, "  negative control  did not run"),

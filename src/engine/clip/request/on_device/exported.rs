@@ -5,11 +5,9 @@ use std::sync::Arc;
 use crate::engine::clip::request::Request;
 use crate::error::Error;
 use crate::gpu::engine::VulkanEngine;
-use crate::gpu::external::{Exported, ExportedResult};
+use crate::gpu::external::ExportedResult;
 use crate::gpu::in_flight::Target;
 use crate::gpu::job::Job;
-use crate::machine::error::EvaluateError;
-use crate::memory::OutOfMemoryError;
 use crate::output::window::Window;
 
 impl Request<'_> {
@@ -25,21 +23,8 @@ impl Request<'_> {
         }
         let part = self.part()?;
         let bytes = (part.window.len() as u64).saturating_mul(self.encoding.bytes() as u64);
-        let needed = usize::try_from(bytes).unwrap_or(usize::MAX);
         let export = |engine: &VulkanEngine, job: Job<'_>, window: &Window| {
-            // The result is allocated as a whole, so smaller windows would not help.
-            let exported = match Exported::new(&engine.device, bytes) {
-                Err(error) if error.is_out_of_memory() && engine.give_back() => {
-                    Exported::new(&engine.device, bytes)
-                }
-                made => made,
-            };
-            let exported = Arc::new(exported.map_err(|error| match error.is_out_of_memory() {
-                true => {
-                    OutOfMemoryError::new::<u8>("a result in the device's memory", needed).into()
-                }
-                false => EvaluateError::from(error),
-            })?);
+            let exported = engine.exported(bytes)?;
             let target = Target::Exported(Arc::clone(&exported));
             engine.run(job, window, target, None)?;
             Ok(ExportedResult::new(exported, bytes))

@@ -1,0 +1,163 @@
+//! The clips of a motion library on a Vulkan device.
+
+use std::fmt;
+use std::ops::Range;
+
+use crate::crowd::states::{FrameStep, MotionTables, check_clips, check_steps};
+use crate::crowd_error::CrowdError;
+use crate::engine::Engine;
+use crate::gpu::external::ExportedResult;
+use crate::gpu::motion::{MappedStates, MotionSource, ResidentMotions, StateSteps, StatesRequest};
+use crate::machine::error::EvaluateError;
+use crate::output::states::StateArray;
+use crate::shader::MotionSample;
+
+/// The clips of [`MotionTables`] in the memory of a Vulkan device, which computes states of them. The states have the
+/// bits that [`MotionTables::sample_into`] and [`MotionTables::differences_into`] compute on the CPU, and stay in
+/// memory of the device. The host uploads 8 bytes for each instance.
+///
+/// ```
+/// use tumble::glam::{Quat, Vec3};
+/// use tumble::crowd::{DeviceMotions, KeyPrecision, MotionBuilder, StateArray};
+/// use tumble::{Device, Engine, Skeleton, TrackSet, VectorMethod, method};
+/// let mut door = TrackSet::new();
+/// door.push("door", &[0.0, 2.0], &[Quat::IDENTITY, Quat::from_rotation_y(1.0)])?;
+/// let skeleton = Skeleton::new(vec![None], vec![Vec3::X])?;
+/// let mut builder = MotionBuilder::new(&skeleton, 705_600, KeyPrecision::Exact)?;
+/// builder.push(&door, method::SLERP, VectorMethod::Linear)?;
+/// let (tables, spans, cells) = builder.finish();
+///
+/// for device in Device::list()? {
+///     let motions = DeviceMotions::new(&Engine::new(device)?, &tables, (&spans, &cells))?;
+///     let (states, ranges) = motions.sample(&[(0, 705_600)], None, &[StateArray::AngularVelocities])?;
+///     let velocity: &[f32] = tumble::bytemuck::cast_slice(&states.bytes()[ranges[0].clone()]);
+///     assert!((velocity[1] - 0.5).abs() < 1e-6);
+/// }
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub struct DeviceMotions {
+    resident: ResidentMotions,
+    clips: usize,
+}
+
+impl DeviceMotions {
+    /// Copies tables to the engine's device. The spans and cells are those that belong to the tables.
+    ///
+    /// # Errors
+    /// When the engine is the CPU, the spans and cells do not belong to the tables, the tables need more memory than the
+    /// device or the engine's memory budget has or more than kernels can bind, or the device fails.
+    pub fn new(
+        engine: &Engine,
+        tables: &MotionTables,
+        (spans, cells): (&[[u32; 4]], &[[f32; 4]]),
+    ) -> Result<Self, CrowdError> {
+        tables.check_parts((spans, cells))?;
+        let opened = engine.opened().ok_or(CrowdError::OnCpu)?;
+        let source = MotionSource {
+            clips: &tables.clips,
+            bases: &tables.bases,
+            spans: bytemuck::cast_slice(spans),
+            channels: &tables.channels,
+            cells,
+            links: &tables.links,
+            joints: tables.joint_count() as u32,
+            ticks_per_second: tables.ticks_per_second(),
+        };
+        Ok(Self {
+            resident: ResidentMotions::new(opened.engine(), &source)?,
+            clips: tables.clip_count(),
+        })
+    }
+
+    /// Bytes of the tables in the device's memory.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        self.resident.bytes()
+    }
+
+    /// Computes states into memory that the host reads: of a device that shares the host's memory, memory that the
+    /// kernels write. `at` has a clip and a tick for each instance, as for [`MotionTables::sample_into`]; with `steps`,
+    /// velocities are differences, as for [`MotionTables::differences_into`]. Also returned are the ranges of the arrays
+    /// in the memory, bytes: `[instance][joint][number]`, f32.
+    ///
+    /// # Errors
+    /// When a clip does not exist, there are more or fewer steps than instances, there is not enough memory, the device
+    /// fails, or the work is stopped.
+    pub fn sample(
+        &self,
+        at: &[(u32, u32)],
+        steps: Option<&[FrameStep]>,
+        arrays: &[StateArray],
+    ) -> Result<(MappedStates, Vec<Range<usize>>), CrowdError> {
+        let (states, ranges) =
+            self.with_request(at, steps, arrays, |request| self.resident.evaluate(request))?;
+        Ok((states, ranges.into_iter().map(in_memory).collect()))
+    }
+
+    /// As [`DeviceMotions::sample`], into memory of the device that other interfaces on the same card, such as CUDA, can
+    /// import. If they can wait for the device, this returns while it is still writing.
+    ///
+    /// # Errors
+    /// As [`DeviceMotions::sample`], and when the device cannot export memory.
+    pub fn export(
+        &self,
+        at: &[(u32, u32)],
+        steps: Option<&[FrameStep]>,
+        arrays: &[StateArray],
+    ) -> Result<(ExportedResult, Vec<Range<usize>>), CrowdError> {
+        let (states, ranges) =
+            self.with_request(at, steps, arrays, |request| self.resident.export(request))?;
+        Ok((states, ranges.into_iter().map(in_memory).collect()))
+    }
+
+    fn with_request<T>(
+        &self,
+        at: &[(u32, u32)],
+        steps: Option<&[FrameStep]>,
+        arrays: &[StateArray],
+        work: impl FnOnce(&StatesRequest<'_>) -> Result<T, EvaluateError>,
+    ) -> Result<T, CrowdError> {
+        check_clips(self.clips, at)?;
+        let sample = |&(clip, tick): &(u32, u32)| MotionSample { clip, tick };
+        let samples: Vec<MotionSample> = at.iter().map(sample).collect();
+        let steps = match steps {
+            None => None,
+            Some(steps) => {
+                check_steps(steps.len(), at.len())?;
+                let ends = [0, 1].map(|end: usize| {
+                    let sample = |(step, &(clip, _)): (&FrameStep, &(u32, u32))| MotionSample {
+                        clip,
+                        tick: step.ticks[end],
+                    };
+                    steps.iter().zip(at).map(sample).collect()
+                });
+                let rates = steps.iter().map(|step| step.per_second).collect();
+                Some(StateSteps { ends, rates })
+            }
+        };
+        let request = StatesRequest {
+            at: &samples,
+            steps,
+            arrays,
+        };
+        work(&request).map_err(|error| match error {
+            EvaluateError::Vulkan(error) | EvaluateError::NoRoom(error) => error.into(),
+            EvaluateError::Set(error) => error.into(),
+        })
+    }
+}
+
+/// A range of memory that exists.
+fn in_memory(range: Range<u64>) -> Range<usize> {
+    range.start as usize..range.end as usize
+}
+
+impl fmt::Debug for DeviceMotions {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("DeviceMotions")
+            .field("device", &self.resident.device_name())
+            .field("clips", &self.clips)
+            .field("bytes", &self.bytes())
+            .finish_non_exhaustive()
+    }
+}
