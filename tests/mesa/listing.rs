@@ -149,6 +149,8 @@ fn is_exact(instruction: &str, generation: Generation) -> bool {
     if !is_float.iter().any(|sign| name.contains(sign)) {
         return true;
     }
+    // Half of a rounded number is exact, but for subnormal numbers and the sign of zero, which no value depends on.
+    let operands = operands.strip_suffix(" div:2").unwrap_or(operands);
     let modifiers = ["mul:", "div:", "clamp", "*2", "*4", "*0.5"];
     if modifiers.iter().any(|sign| operands.contains(sign)) {
         return false;
@@ -163,7 +165,7 @@ fn is_exact(instruction: &str, generation: Generation) -> bool {
         "add_f32" | "sub_f32" | "subrev_f32" | "mul_f32" => true,
         // The result is one of the operands, so it is not rounded: made of a comparison and a selection, which
         // differ from it for NaN and for the sign of zero alone.
-        "min_f32" | "max_f32" => true,
+        "min_f32" | "max_f32" | "min_num_f32" | "max_num_f32" => true,
         "cvt_f32_i32" | "cvt_f32_u32" | "cvt_f32_ubyte0" | "cvt_f32_ubyte1" | "cvt_f32_ubyte2"
         | "cvt_f32_ubyte3" => true,
         // The pass leaves it in kernels that ask for its rounding.
@@ -206,6 +208,8 @@ fn what_rounds_otherwise_is_refused() {
         "v_fmac_f32_e32 v1, 0.5, v2",
         "v_fmamk_f32 v1, v2, 0x40800000, v3",
         "v_min_f32_e32 v1, v2, v3",
+        "v_min_num_f32_e32 v1, v2, v3",
+        "v_add_f32_e64 v1, v2, v3 div:2",
         "v_cvt_f16_f32_e32 v1, v2",
         "v_fma_mixlo_f16 v1, 1.0, v2, neg(lo(0))",
         "v_fma_mixhi_f16 v1, 1.0, v2, neg(0) op_sel_hi:[0,0,1]",
@@ -235,6 +239,7 @@ fn what_rounds_otherwise_is_refused() {
         "v_min3_f32 v1, v2, v3, v4",
         "v_fma_mixlo_f16 v1, 1.0, v2, v3",
         "v_add_f32_e64 v1, v2, v3 mul:2",
+        "v_fma_f32 v1, v2, v3, v4 div:2",
         "v_add_f32_e64 v1, v2, v3 clamp",
     ] {
         assert_eq!(exact(line), [false; 2], "{line}");

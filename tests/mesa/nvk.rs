@@ -55,7 +55,7 @@ impl Listing {
         *found.unwrap_or_else(|| panic!("no `{name}` in {:?}", self.statistics))
     }
 
-    /// The blocks of the longest loop without a loop inside, else all.
+    /// The blocks of the loop without a loop inside that stores most, the longest of several; else all.
     fn hot(&self) -> &[Block] {
         let ends = self.blocks.iter().enumerate();
         let loops: Vec<_> = ends
@@ -73,7 +73,8 @@ impl Listing {
         };
         let hot = loops.iter().filter(is_innermost);
         let hot = hot.map(|range| &self.blocks[range.clone()]);
-        hot.max_by_key(|blocks| count(blocks, |_| true))
+        let stores = |name: &str| name.starts_with("st.");
+        hot.max_by_key(|blocks| (count(blocks, stores), count(blocks, |_| true)))
             .unwrap_or(&self.blocks)
     }
 

@@ -200,12 +200,12 @@ impl SpreadLanes {
     /// The number of samples of the pieces into which a run is cut; the last one may have fewer. Those of tracks are about
     /// as long as each other, so that none is short.
     fn piece_samples(self, run: &SpreadRun) -> u32 {
-        let most = self.max_iterations << self.sample_lanes_log2();
+        let max_samples = self.max_iterations << self.sample_lanes_log2();
         match self.axis {
-            LaneAxis::Samples => most,
+            LaneAxis::Samples => max_samples,
             LaneAxis::Tracks { .. } => {
                 let count = sample_count(run).max(1);
-                count.div_ceil(count.div_ceil(most))
+                count.div_ceil(count.div_ceil(max_samples))
             }
         }
     }
