@@ -11,7 +11,8 @@ use crate::cuda::CudaError;
 use crate::device_array::{ArrayMemory, DeviceArray};
 use crate::engine::Engine;
 use crate::errors::{device, guarded, input};
-use crate::motions::{Motions, of_crowd};
+use crate::motions::{MANY, Motions, of_crowd};
+use crate::run::stoppable;
 
 /// The clips of a motion library on a device, which samples them there.
 #[pyclass(frozen, weakref, module = "tumble._tumble")]
@@ -106,20 +107,23 @@ impl DeviceMotions {
         if arrays.iter().any(are_placed) {
             motions.check_placed(&at)?;
         }
-        let (memory, ranges) = py.detach(|| {
-            guarded(|| match self.is_on_card {
-                true => {
-                    let made = self.device.export(&at, steps.as_deref(), &arrays);
-                    let (result, ranges) = made.map_err(of_crowd)?;
-                    let memory = ArrayMemory::on_card(result).map_err(|error| of_cuda(&error))?;
-                    Ok((memory, ranges))
-                }
-                false => {
-                    let made = self.device.sample(&at, steps.as_deref(), &arrays);
-                    let (states, ranges) = made.map_err(of_crowd)?;
-                    Ok((ArrayMemory::Host(states), ranges))
-                }
-            })
+        let work = || match self.is_on_card {
+            true => {
+                let made = self.device.export(&at, steps.as_deref(), &arrays);
+                let (result, ranges) = made.map_err(of_crowd)?;
+                let memory = ArrayMemory::on_card(result).map_err(|error| of_cuda(&error))?;
+                Ok((memory, ranges))
+            }
+            false => {
+                let made = self.device.sample(&at, steps.as_deref(), &arrays);
+                let (states, ranges) = made.map_err(of_crowd)?;
+                Ok((ArrayMemory::Host(states), ranges))
+            }
+        };
+        let joints = at.len().saturating_mul(motions.joints());
+        let (memory, ranges) = py.detach(|| match joints < MANY {
+            true => guarded(work),
+            false => stoppable(work),
         })?;
         let memory = Arc::new(memory);
         let array = |(array, range): (&StateArray, std::ops::Range<usize>)| {

@@ -43,7 +43,7 @@ const LONGEST: f64 = 2.1e9;
 const CLIPS_AT_ONCE: usize = 1024;
 
 /// Joints of a call from which on Ctrl-C is looked for.
-const MANY: usize = 1 << 21;
+pub(crate) const MANY: usize = 1 << 21;
 
 /// The clips of a motion library, prepared: what is sampled, and its arrays for files.
 #[pyclass(frozen, weakref, module = "tumble._tumble")]
