@@ -336,7 +336,22 @@ def test_clips_are_drawn_by_their_lengths():
     assert (library.draw(9, np.random.default_rng(3), weights=[1, 0])[0] == 0).all()
     with pytest.raises(tumble.InputError, match="for each of the 2 clips"):
         library.draw(1, np.random.default_rng(3), weights=[1])
+    with pytest.raises(tumble.InputError, match="they are 0"):
+        library.draw(1, np.random.default_rng(3), weights=[0, 0])
+    with pytest.raises(tumble.InputError, match="there is no clip -1; there are 2"):
+        library.sample_times([-1], np.random.default_rng(3))
     assert library.nbytes > 48 * 31
+
+
+def test_windows_that_are_drawn_end_in_their_clips():
+    library = tumble.MotionLibrary([wave(31, 30), wave(91, 30)])
+    ids, times = library.draw(4000, np.random.default_rng(3), window=0.5)
+    assert (times >= 0).all() and (times + 0.5 <= library.lengths[ids]).all()
+    assert abs((ids == 1).mean() - 2.5 / 3) < 0.03
+    assert (library.draw(99, np.random.default_rng(3), window=2)[0] == 1).all()
+    for window, match in [(4, "no clip lasts 4 s; the longest lasts 3.0 s"), (-1, "no number of seconds")]:
+        with pytest.raises(tumble.InputError, match=match):
+            library.draw(1, np.random.default_rng(3), window=window)
 
 
 def test_what_does_not_fit_is_left_out_and_listed(tmp_path):

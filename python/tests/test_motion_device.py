@@ -38,6 +38,7 @@ def bits(array) -> np.ndarray:
     """The bits of an array of a device, which NumPy has by DLPack."""
     shared = np.from_dlpack(array)
     assert np.array_equal(shared.view(np.uint32), array.numpy().view(np.uint32))
+    assert np.asarray(array).tobytes() == array.numpy().tobytes() and np.asarray(array, np.float64).dtype == np.float64
     return shared.view(np.uint32)
 
 

@@ -533,7 +533,8 @@ class MotionLibrary(Generic[_A]):
     ) -> MotionState[Any]:
         """The states of instances: `clip_ids` has the clip of each instance, and `times` its time, in seconds after the clip's
         first key. (`Clip` and `Engine` use the times of the keys.) Both have the shape of the result, (N,) for example, or
-        shapes that broadcast to it, such as (N, 1) and (N, 10), or a number and (N,).
+        shapes that broadcast to it, such as (N, 1) and (N, 10), or a number and (N,). Before the first key of a clip, and after
+        its last one, the pose is that of this key, and the velocities are those at it, not 0.
 
         `arrays`: the names of those to compute, by default all; fewer arrays take less time. `out`: a state; the arrays
         that it has are filled again. `finite`: velocities as differences of the two frames of the clip's rate around a
@@ -799,11 +800,19 @@ class MotionLibrary(Generic[_A]):
         return found
 
     def draw(
-        self, count: int, rng: np.random.Generator, *, weights: ArrayLike | None = None
+        self,
+        count: int,
+        rng: np.random.Generator,
+        *,
+        weights: ArrayLike | None = None,
+        window: float = 0.0,
     ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
         """Random clips and times: `clip_ids` and `times`, (count,), for `sample`. The probability of a clip is proportional to
         its entry in `weights`, by default to its length, so that every moment is equally likely. Times are uniform within a
         clip. The same state of `rng` gives the same result.
+
+        `window`: the seconds that have to follow each time in its clip, for `sample_windows`: (frames - 1) / fps. Clips that
+        are shorter are not drawn, and by default the probability of a clip is proportional to the times that are left.
 
         >>> import numpy as np, tumble
         >>> door = tumble.Clip([0.0, 2.0], [[[0, 0, 0, 1], [0, 0, 1, 0]]], parents=[None])
@@ -811,14 +820,24 @@ class MotionLibrary(Generic[_A]):
         >>> ids
         array([0, 0, 0, 0])
         """
-        each = np.asarray(self.lengths if weights is None else weights, np.float64)
+        if not 0 <= window < np.inf:
+            raise InputError(f"window: {window!r} is no number of seconds from 0 on")
+        left = self.lengths - window
+        each = np.asarray(np.maximum(left, 0.0) if weights is None else weights, np.float64)
         if each.shape != (len(self),) or not np.isfinite(each).all() or (each < 0).any():
             raise InputError(f"weights: give a number of 0 or more for each of the {len(self)} clips")
+        fits = left >= 0
+        if not fits.any():
+            longest = self.lengths.max(initial=0.0)
+            raise InputError(f"window: no clip lasts {window} s; the longest lasts {longest} s")
+        each = np.where(fits, each, 0.0)
         total = each.sum()
+        if total == 0 and weights is not None:
+            raise InputError("weights: they are 0 for all clips that can be drawn")
         # If all clips have only one key, their length is 0, and all are equally likely.
-        chances = each / total if total > 0 else np.full(len(self), 1 / len(self))
+        chances = each / total if total > 0 else fits / fits.sum()
         ids = rng.choice(len(self), size=count, p=chances).astype(np.int64)
-        return ids, self.sample_times(ids, rng)
+        return ids, rng.uniform(0.0, np.maximum(left[ids], 0.0))
 
     @property
     def nbytes(self) -> int:
@@ -843,7 +862,11 @@ class MotionLibrary(Generic[_A]):
         >>> ((0 <= times) & (times <= 2)).all()
         np.True_
         """
-        times: NDArray[np.float64] = rng.uniform(0.0, self.lengths[np.asarray(clip_ids)])
+        ids = np.asarray(clip_ids)
+        unknown = ids[(ids < 0) | (ids >= len(self))]
+        if unknown.size:
+            raise InputError(f"clip_ids: there is no clip {unknown[0]}; there are {len(self)}, from 0")
+        times: NDArray[np.float64] = rng.uniform(0.0, self.lengths[ids])
         return times
 
     def save(self, path: _Path) -> None:
