@@ -20,7 +20,7 @@ fn tracks_with_the_same_times_have_the_bits_of_the_cpu_frame_by_frame() {
     const TRACKS: usize = 45;
     let times = [0.0, 0.25, 0.9, 1.0, 2.013, 4.0, 4.5];
     let key = |i: usize| {
-        let angle = if i % 5 == 0 {
+        let angle = if i.is_multiple_of(5) {
             1e-21
         } else {
             0.1 * (i % 7) as f32
