@@ -225,7 +225,7 @@ fn digits_of_an_f64_show_its_rate() {
     );
 }
 
-/// What is evaluated at a rate has this rate when it is read again, though its end lies between two frames.
+/// A clip that was evaluated at a rate has this rate when it is read again, though its end lies between two frames.
 #[test]
 fn a_second_step_has_the_rate_of_the_first() {
     let temporary = tempfile::tempdir().unwrap();

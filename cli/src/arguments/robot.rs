@@ -264,8 +264,8 @@ impl DialectArguments {
             LimitRule::Refuse => "--limits report keeps their values",
         };
         // In degrees, a pose that every joint can have is turns outside.
-        let is_far = |excess: &&LimitExcess| excess.unit == "rad" && excess.excess > TAU;
-        let doubt = match 2 * excesses.iter().filter(is_far).count() > excesses.len() {
+        let is_circles_away = |excess: &&LimitExcess| excess.unit == "rad" && excess.excess > TAU;
+        let doubt = match 2 * excesses.iter().filter(is_circles_away).count() > excesses.len() {
             true => "; by more than a turn: are the file's angles in degrees?",
             false => "",
         };

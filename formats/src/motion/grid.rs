@@ -59,18 +59,18 @@ pub(crate) fn frames_before_end(lists: &[Vec<f64>], precision: Precision) -> Opt
             _ => list.clone(),
         })
         .collect();
-    let most = frames.iter().max_by_key(|list| list.len())?;
-    let (&first, &last) = (most.first()?, most.last()?);
+    let longest = frames.iter().max_by_key(|list| list.len())?;
+    let (&first, &last) = (longest.first()?, longest.last()?);
     // A quick answer for most clips, whose keys are as far apart at the end as before.
-    let mean = (last - first) / (most.len() - 1) as f64;
+    let mean = (last - first) / (longest.len() - 1) as f64;
     let is_short = (0.0..0.999 * mean).contains(&(end - last));
-    if most.len() < FRAMES_IN_A_ROW || !is_short || end == last {
+    if longest.len() < FRAMES_IN_A_ROW || !is_short || end == last {
         return None;
     }
     let found = of(&RateSource::Times(&frames, precision)).filter(|found| found.is_rate)?;
     let count = ((last - first) * found.grid.per_second()).round() as usize + 1;
     let is_between = !on_frames(std::iter::once(end), found.grid, found.phase, precision);
-    (count == most.len() && is_between).then_some(found)
+    (count == longest.len() && is_between).then_some(found)
 }
 
 /// How many times of a list are on frames: all, or all but that of the clip's end.

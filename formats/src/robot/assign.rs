@@ -218,9 +218,10 @@ fn valued_scalars<'a>(
 fn whole_circles(angles: &[f64]) -> Option<f64> {
     let [low, high] = [f64::min, f64::max].map(|pick| angles.iter().copied().reduce(pick));
     let (low, high) = (low?, high?);
-    let turns = (f64::midpoint(low, high) / TAU).round() * TAU;
-    let [before, after] = [0.0, turns].map(|turns| (low - turns).abs().max((high - turns).abs()));
-    (2.0 * after < before).then_some(turns)
+    let circles = (f64::midpoint(low, high) / TAU).round() * TAU;
+    let [before, after] =
+        [0.0, circles].map(|circles| (low - circles).abs().max((high - circles).abs()));
+    (2.0 * after < before).then_some(circles)
 }
 
 /// The tracks that move joints, with the names of these.
