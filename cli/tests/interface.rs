@@ -106,6 +106,8 @@ const NOT_CLONED: &[(&str, &str)] = &[
     ("Samples", "it is large memory; copy its slice"),
     ("Transforms", "it has samples"),
     ("crowd::Crowd", "it is on its device"),
+    ("crowd::DeviceMotions", "it is on its device"),
+    ("crowd::MappedStates", "it is memory of its device"),
     ("crowd::MotionStates", "it lends memory of the caller"),
     ("paths::Followed", "it has samples"),
     ("reference::FollowerWalk", "it steps along a path"),

@@ -6,13 +6,13 @@ use pyo3::exceptions::{PyAttributeError, PyBufferError, PyTypeError, PyValueErro
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 use tumble::ComponentType;
-use tumble::crowd::MappedStates;
 use tumble::vulkan::ExportedResult;
 
+use crate::array_memory::{ArrayMemory, CPU, CUDA, of_cuda};
 use crate::arrays::numpy;
-use crate::cuda::{CudaError, DEFAULT_STREAM, Mapping};
-use crate::dlpack::{self, CPU, CUDA};
-use crate::errors::{device, guarded};
+use crate::cuda::DEFAULT_STREAM;
+use crate::dlpack;
+use crate::errors::guarded;
 use crate::output::{array_of, filled_bytes, type_name};
 
 /// A result in the memory of a device, made by `Engine.evaluate(…, device_array=True)` on an NVIDIA card, or by a
@@ -36,58 +36,6 @@ pub(crate) struct DeviceArray {
     start: usize,
     shape: Vec<usize>,
     component: ComponentType,
-}
-
-/// The memory of one array or several.
-pub(crate) enum ArrayMemory {
-    /// Of a card that CUDA has.
-    Card(Mapping),
-    /// Of the host, complete.
-    Host(MappedStates),
-}
-
-impl ArrayMemory {
-    /// Memory of a card. Called without the interpreter's lock.
-    pub(crate) fn on_card(result: ExportedResult) -> Result<Self, CudaError> {
-        Mapping::new(result).map(Self::Card)
-    }
-
-    /// Its device, as DLPack numbers devices.
-    pub(crate) fn device(&self) -> (i32, i32) {
-        match self {
-            Self::Card(mapping) => (CUDA, mapping.ordinal),
-            Self::Host(_) => (CPU, 0),
-        }
-    }
-
-    /// The address of its first byte.
-    pub(crate) fn address(&self) -> usize {
-        match self {
-            Self::Card(mapping) => mapping.address() as usize,
-            Self::Host(states) => states.bytes().as_ptr().expose_provenance(),
-        }
-    }
-
-    /// Copies bytes from `start` on to the host.
-    fn copy_to_host(&self, start: usize, bytes: &mut [u8]) -> PyResult<()> {
-        match self {
-            Self::Card(mapping) => {
-                let copied = mapping.copy_to_host(start, bytes);
-                copied.map_err(|error| of_cuda(&error))
-            }
-            Self::Host(states) => {
-                bytes.copy_from_slice(&states.bytes()[start..][..bytes.len()]);
-                Ok(())
-            }
-        }
-    }
-}
-
-/// CUDA's refusal, with the remedy in Python.
-fn of_cuda(error: &CudaError) -> PyErr {
-    device(&format!(
-        "device_array: {error}; without device_array=True results are arrays of NumPy's"
-    ))
 }
 
 impl DeviceArray {

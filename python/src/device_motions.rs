@@ -7,8 +7,9 @@ use pyo3::prelude::*;
 use tumble::crowd::{FrameStep, StateArray};
 use tumble::vulkan::{ExportedResult, VulkanError};
 
+use crate::array_memory::ArrayMemory;
 use crate::cuda::CudaError;
-use crate::device_array::{ArrayMemory, DeviceArray};
+use crate::device_array::DeviceArray;
 use crate::engine::Engine;
 use crate::errors::{device, guarded, input};
 use crate::motions::{MANY, Motions, of_crowd};

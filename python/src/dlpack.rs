@@ -12,11 +12,7 @@ use pyo3::ffi;
 use pyo3::prelude::*;
 use tumble::ComponentType;
 
-use crate::device_array::ArrayMemory;
-
-/// `kDLCPU` and `kDLCUDA`.
-pub(crate) const CPU: i32 = 1;
-pub(crate) const CUDA: i32 = 2;
+use crate::array_memory::ArrayMemory;
 
 /// The version of the newer form.
 const VERSION: Version = Version { major: 1, minor: 0 };

@@ -5,6 +5,7 @@
 //! exception (`errors`). The interpreter's lock is released while the engine works. Results that stay on a card
 //! (`device_array`) are handed on by CUDA's driver (`cuda`) and DLPack (`dlpack`), the only ones with `unsafe`.
 
+mod array_memory;
 mod arrays;
 mod build;
 mod clip;
