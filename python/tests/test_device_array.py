@@ -316,7 +316,7 @@ for name in names:
     assert waits(stream=2) == ["2"] * semaphores
     assert waits(stream=0x7f00) == [str(0x7f00)] * semaphores
     assert waits(stream=-1) == []
-    refused(lambda: waits(stream=0), "stream: 0 may be", error=BufferError)
+    refused(lambda: waits(stream=0), "stream: 0 is ambiguous", error=BufferError)
     refused(lambda: waits(stream=-2), "there is no stream -2", error=BufferError)
 
     # The form of the capsule, and the device, that are requested.

@@ -525,7 +525,7 @@ def test_rotations_have_the_representation_that_is_asked_for(clips, rng):
         ({"out": six}, r"its rotations are float32 \(5, 6, 7, 6\); the result's are float32 \(5, 6, 7, 4\)"),
         ({"out": tumble.MotionState(velocities=np.zeros((5, 6, 7, 3)))}, r"its velocities are float64 .* float32"),
         ({"out": tumble.MotionState(positions=[[0.0]])}, "its positions are of the type list"),
-        ({"out": tumble.MotionState(positions=np.zeros((5, 6, 7, 6), np.float32)[..., ::2])}, "its positions do not lie"),
+        ({"out": tumble.MotionState(positions=np.zeros((5, 6, 7, 6), np.float32)[..., ::2])}, "the numbers of its positions are not contiguous"),
     ]:
         with pytest.raises(tumble.InputError, match=words):
             library.sample(ids, times, **keywords)

@@ -8,6 +8,7 @@ use crate::shader::{ANGULAR_VELOCITY, LOCAL_ROTATION, POSITION, VELOCITY, WORLD_
 
 /// An array of [`MotionStates`](crate::crowd::MotionStates).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub enum StateArray {
     /// Rotations in the parents' frames, `x y z w`.
     Rotations,
