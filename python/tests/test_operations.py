@@ -628,6 +628,9 @@ def test_path_errors_are_those_of_the_program(rng, tmp_path):
     two = tumble.Clip(TIMES, unit(rng, 2, 4), names=["a", "b"])
     with pytest.raises(tumble.InputError, match="reference: has 2 tracks"):
         tumble.path_errors(two, two)
+    with pytest.raises(tumble.InputError, match="has no positions"):
+        tumble.path_errors(two, two, track="b")
+    two = tumble.Clip(TIMES, unit(rng, 2, 4), names=["a", "b"], translations=np.zeros((2, 4, 3)))
     assert tumble.path_errors(two, two, track="b").ape_rotation.max < 1e-4
 
 
