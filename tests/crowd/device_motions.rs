@@ -43,6 +43,7 @@ fn bits(of: &StateResults, array: StateArray) -> &[u8] {
         StateArray::WorldRotations => bytemuck::cast_slice(&of.world_rotations),
         StateArray::Velocities => bytemuck::cast_slice(&of.velocities),
         StateArray::AngularVelocities => bytemuck::cast_slice(&of.angular_velocities),
+        _ => unreachable!("an array that this test does not know: {array:?}"),
     }
 }
 

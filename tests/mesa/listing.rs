@@ -113,6 +113,13 @@ impl Listing {
     }
 }
 
+/// Whether an instruction is an exact one whose result is halved. Half of a rounded number is exact, but for subnormal
+/// numbers and the sign of zero: only for kernels no value of which depends on these.
+pub(super) fn is_exact_half(instruction: &str, generation: Generation) -> bool {
+    let whole = instruction.strip_suffix(" div:2");
+    whole.is_some_and(|whole| is_exact(whole, generation))
+}
+
 /// An instruction of the compiler's text, which writes what is defined before it, in the order of
 /// the assembler's operands.
 fn as_assembler(instruction: &str) -> String {
@@ -149,8 +156,6 @@ fn is_exact(instruction: &str, generation: Generation) -> bool {
     if !is_float.iter().any(|sign| name.contains(sign)) {
         return true;
     }
-    // Half of a rounded number is exact, but for subnormal numbers and the sign of zero, which no value depends on.
-    let operands = operands.strip_suffix(" div:2").unwrap_or(operands);
     let modifiers = ["mul:", "div:", "clamp", "*2", "*4", "*0.5"];
     if modifiers.iter().any(|sign| operands.contains(sign)) {
         return false;
@@ -209,7 +214,6 @@ fn what_rounds_otherwise_is_refused() {
         "v_fmamk_f32 v1, v2, 0x40800000, v3",
         "v_min_f32_e32 v1, v2, v3",
         "v_min_num_f32_e32 v1, v2, v3",
-        "v_add_f32_e64 v1, v2, v3 div:2",
         "v_cvt_f16_f32_e32 v1, v2",
         "v_fma_mixlo_f16 v1, 1.0, v2, neg(lo(0))",
         "v_fma_mixhi_f16 v1, 1.0, v2, neg(0) op_sel_hi:[0,0,1]",
@@ -239,6 +243,7 @@ fn what_rounds_otherwise_is_refused() {
         "v_min3_f32 v1, v2, v3, v4",
         "v_fma_mixlo_f16 v1, 1.0, v2, v3",
         "v_add_f32_e64 v1, v2, v3 mul:2",
+        "v_add_f32_e64 v1, v2, v3 div:2",
         "v_fma_f32 v1, v2, v3, v4 div:2",
         "v_add_f32_e64 v1, v2, v3 clamp",
     ] {

@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use super::compile::{divisions, listings, this_program};
-use super::listing::{Generation, Listing};
+use super::listing::{Generation, Listing, is_exact_half};
 use super::table::{self, Cost};
 use super::{Driver, newer, unpacked_if_there, with_driver};
 use crate::support::is_due;
@@ -107,6 +107,8 @@ fn faults(kernel: &str, listing: &Listing, generation: Generation) -> Vec<String
         let of_division = of_division.into_iter().position(|is_found| is_found);
         match of_division.map(|part| &mut left[part]) {
             Some(left) if *left > 0 => *left -= 1,
+            // Mesa 26 computes half of a product so, which is subtracted from 1.5.
+            None if kernel == "poses_smooth" && is_exact_half(instruction, generation) => {}
             _ => faults.push(format!("`{instruction}` is not exact")),
         }
     }

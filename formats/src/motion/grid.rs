@@ -52,14 +52,12 @@ const FRAMES_IN_A_ROW: usize = 8;
 pub(crate) fn frames_before_end(lists: &[Vec<f64>], precision: Precision) -> Option<FrameGrid> {
     let ends = lists.iter().filter_map(|list| list.last().copied());
     let end = ends.fold(f64::NEG_INFINITY, f64::max);
-    let frames: Vec<Vec<f64>> = lists
-        .iter()
-        .map(|list| match list.split_last() {
-            Some((&last, others)) if last == end => others.to_vec(),
-            _ => list.clone(),
-        })
-        .collect();
-    let longest = frames.iter().max_by_key(|list| list.len())?;
+    let before_end = |list: &[f64]| match list.last() {
+        Some(&last) if last == end => list.len() - 1,
+        _ => list.len(),
+    };
+    let longest = lists.iter().max_by_key(|list| before_end(list))?;
+    let longest = &longest[..before_end(longest)];
     let (&first, &last) = (longest.first()?, longest.last()?);
     // A quick answer for most clips, whose keys are as far apart at the end as before.
     let mean = (last - first) / (longest.len() - 1) as f64;
@@ -67,6 +65,8 @@ pub(crate) fn frames_before_end(lists: &[Vec<f64>], precision: Precision) -> Opt
     if longest.len() < FRAMES_IN_A_ROW || !is_short || end == last {
         return None;
     }
+    let frames = lists.iter().map(|list| list[..before_end(list)].to_vec());
+    let frames: Vec<Vec<f64>> = frames.collect();
     let found = of(&RateSource::Times(&frames, precision)).filter(|found| found.is_rate)?;
     let count = ((last - first) * found.grid.per_second()).round() as usize + 1;
     let is_between = !on_frames(std::iter::once(end), found.grid, found.phase, precision);
