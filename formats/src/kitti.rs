@@ -243,7 +243,7 @@ fn write_motion(
     out: &mut dyn Write,
 ) -> Result<Vec<Diagnostic>, WriteError> {
     let path = Trajectory::of(clips, options)?;
-    let mut warnings: Vec<Diagnostic> = path.no_positions().into_iter().collect();
+    let mut warnings = Vec::new();
     if !options.times_apart {
         let times = path.sampled.times;
         let is_frame = |rate: FrameRate, (frame, &time): (usize, &f64)| {
@@ -277,6 +277,7 @@ fn write_motion(
         out.write_all(text.as_bytes())?;
         text.clear();
     }
+    warnings.extend(path.no_positions());
     Ok(warnings)
 }
 

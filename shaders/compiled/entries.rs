@@ -3167,10 +3167,11 @@ pub(crate) async fn main_of_together<M: Machine>(machine: &M) {
     let sample_lane = invocation & all.sample_mask;
     first_j = 0u32.wrapping_sub(first & all.line_mask);
     loop {
-        let _block = machine.block(line!(), 20);
+        let _block = machine.block(line!(), 21);
         let loaded_4 = iteration;
         let values = (loaded_4 & 1u32)
-            .wrapping_mul(0x180u32)
+            .wrapping_mul(SPREAD_WORKGROUP)
+            .wrapping_mul(3u32)
             .wrapping_add(run_values);
         let loaded_5 = first_j;
         let j = loaded_5.wrapping_add(sample_lane);
@@ -3375,10 +3376,11 @@ pub(crate) async fn main_of_together_2<M: Machine>(machine: &M) {
     let sample_lane = invocation & all.sample_mask;
     first_j = 0u32.wrapping_sub(first & all.line_mask);
     loop {
-        let _block = machine.block(line!(), 20);
+        let _block = machine.block(line!(), 21);
         let loaded_4 = iteration;
         let values = (loaded_4 & 1u32)
-            .wrapping_mul(0x480u32)
+            .wrapping_mul(SPREAD_WORKGROUP)
+            .wrapping_mul(9u32)
             .wrapping_add(run_values);
         let loaded_5 = first_j;
         let j = loaded_5.wrapping_add(sample_lane);
@@ -3583,10 +3585,11 @@ pub(crate) async fn main_of_together_3<M: Machine>(machine: &M) {
     let sample_lane = invocation & all.sample_mask;
     first_j = 0u32.wrapping_sub(first & all.line_mask);
     loop {
-        let _block = machine.block(line!(), 20);
+        let _block = machine.block(line!(), 21);
         let loaded_4 = iteration;
         let values = (loaded_4 & 1u32)
-            .wrapping_mul(0x180u32)
+            .wrapping_mul(SPREAD_WORKGROUP)
+            .wrapping_mul(3u32)
             .wrapping_add(run_values);
         let loaded_5 = first_j;
         let j = loaded_5.wrapping_add(sample_lane);
@@ -4061,10 +4064,11 @@ pub(crate) async fn main_of_together_4<M: Machine>(machine: &M) {
     let sample_lane = invocation & all.sample_mask;
     first_j = 0u32.wrapping_sub(first & all.line_mask);
     loop {
-        let _block = machine.block(line!(), 20);
+        let _block = machine.block(line!(), 21);
         let loaded_4 = iteration;
         let values = (loaded_4 & 1u32)
-            .wrapping_mul(0x180u32)
+            .wrapping_mul(SPREAD_WORKGROUP)
+            .wrapping_mul(3u32)
             .wrapping_add(run_values);
         let loaded_5 = first_j;
         let j = loaded_5.wrapping_add(sample_lane);
@@ -4271,10 +4275,11 @@ pub(crate) async fn main_of_together_5<M: Machine>(machine: &M) {
     let sample_lane = invocation & all.sample_mask;
     first_j = 0u32.wrapping_sub(first & all.line_mask);
     loop {
-        let _block = machine.block(line!(), 20);
+        let _block = machine.block(line!(), 21);
         let loaded_4 = iteration;
         let values = (loaded_4 & 1u32)
-            .wrapping_mul(0x480u32)
+            .wrapping_mul(SPREAD_WORKGROUP)
+            .wrapping_mul(9u32)
             .wrapping_add(run_values);
         let loaded_5 = first_j;
         let j = loaded_5.wrapping_add(sample_lane);
@@ -4481,10 +4486,11 @@ pub(crate) async fn main_of_together_6<M: Machine>(machine: &M) {
     let sample_lane = invocation & all.sample_mask;
     first_j = 0u32.wrapping_sub(first & all.line_mask);
     loop {
-        let _block = machine.block(line!(), 20);
+        let _block = machine.block(line!(), 21);
         let loaded_4 = iteration;
         let values = (loaded_4 & 1u32)
-            .wrapping_mul(0x180u32)
+            .wrapping_mul(SPREAD_WORKGROUP)
+            .wrapping_mul(3u32)
             .wrapping_add(run_values);
         let loaded_5 = first_j;
         let j = loaded_5.wrapping_add(sample_lane);

@@ -55,7 +55,8 @@ fn main(
     var first_j = 0u - (first & all.line_mask);
     var iteration = 0u;
     loop {
-        let values = (iteration & 1u) * (SPREAD_WORKGROUP * PARTS) + run_values;
+        // The size of workgroups is a factor of its own, because `tumble lab` chooses another.
+        let values = (iteration & 1u) * SPREAD_WORKGROUP * PARTS + run_values;
         let j = first_j + sample_lane;
         if j < lane_count {
             var rotation: vec4f;

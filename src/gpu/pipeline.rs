@@ -8,18 +8,8 @@ use ash::vk;
 use crate::gpu::device::LogicalDevice;
 use crate::machine::error::VulkanError;
 use crate::machine::error::calls::Named;
-use crate::shader::{
-    Access, CrowdWholeDispatch, Dispatch, Grid, Kernel, PoseDispatch, RowShape, spirv,
-};
-
-/// The maximum size of push constants, bytes; Vulkan guarantees at least 128.
-const PUSHED: u32 = {
-    let size = size_of::<CrowdWholeDispatch>();
-    assert!(size_of::<Dispatch>() <= size && size_of::<Grid>() <= size);
-    assert!(size_of::<RowShape>() <= size && size_of::<PoseDispatch>() <= size);
-    assert!(size <= 128);
-    size as u32
-};
+use crate::shader::{Access, Kernel, spirv};
+use crate::work::recording::MAX_PUSHED;
 
 /// A compute pipeline with its layouts.
 pub(crate) struct Pipeline {
@@ -140,7 +130,7 @@ impl Pipeline {
         let set_layouts = [pipeline.set_layout];
         let constants = [vk::PushConstantRange::default()
             .stage_flags(vk::ShaderStageFlags::COMPUTE)
-            .size(PUSHED)];
+            .size(MAX_PUSHED as u32)];
         let info = vk::PipelineLayoutCreateInfo::default()
             .set_layouts(&set_layouts)
             .push_constant_ranges(&constants);

@@ -15,6 +15,9 @@ use bytemuck::NoUninit;
 
 use crate::shader::{Access, Kernel, WORKGROUP};
 
+/// The most bytes of push constants, for which pipelines have room; Vulkan guarantees 128.
+pub(crate) const MAX_PUSHED: usize = 64;
+
 /// A resource of a recording: a range of a buffer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Resource(u32);
@@ -321,12 +324,14 @@ impl Recording {
 
     /// Runs a kernel with these push constants. Workgroups beyond a device's limit along x continue along y, if they
     /// are one row.
-    pub(crate) fn dispatch(&mut self, set: Set, push: &impl NoUninit, groups: [u32; 3]) {
+    pub(crate) fn dispatch<T: NoUninit>(&mut self, set: Set, push: &T, groups: [u32; 3]) {
+        const { assert!(size_of::<T>() <= MAX_PUSHED) };
         self.dispatch_with(set, bytemuck::bytes_of(push), groups);
     }
 
     /// As [`Recording::dispatch`].
     pub(crate) fn dispatch_with(&mut self, set: Set, push: &[u8], groups: [u32; 3]) {
+        assert!(push.len() <= MAX_PUSHED);
         let push = self.stored(push);
         let Bound { kernel, bindings } = self.bound[set.index()].clone();
         let all = take(&mut self.bindings);
