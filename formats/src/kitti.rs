@@ -464,6 +464,6 @@ mod tests {
         let (written, warnings) = write(clip, &MotionOptions::default()).unwrap();
         assert_eq!(written, format!("{text}0\n0.1\n"));
         assert_eq!(warnings[0].code, Code::NoRoom);
-        assert!(warnings[0].message.contains("10 a second, from 0 s"));
+        assert!(warnings[0].message.contains("10 fps, from 0 s"));
     }
 }
