@@ -105,7 +105,7 @@ types() {
     for name in aarch64-apple-darwin aarch64-linux-android; do
         target $name
         step "$name: the engine, files and routes type-check"
-        cargo check --quiet -p tumble -p tumble-formats -p tumble-routes \
+        cargo check --quiet -p tumble -p tumble-exact -p tumble-formats -p tumble-routes \
             --no-default-features --features tumble/vulkan --target $name
         echo "they do"
     done

@@ -13,6 +13,8 @@ mod c2;
 mod crowd;
 mod encoding;
 #[cfg(feature = "vulkan")]
+mod exact_functions;
+#[cfg(feature = "vulkan")]
 mod examples;
 #[cfg(all(feature = "vulkan", target_os = "linux"))]
 mod exported;

@@ -7,20 +7,26 @@ use std::process::{Command, Stdio};
 use naga::back::spv;
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 use proptest::prelude::*;
-#[allow(unreachable_pub)]
-#[path = "../shader-compiler/src/exactness.rs"]
-pub(crate) mod exactness;
-
-use exactness::spirv::{FloatControls, SpirvError, float_controls, without_decorations};
-use exactness::{
-    PassError, no_contraction, nontemporal_stores, of_halves, splat_products, texel_buffers,
-    workgroup_layouts,
+use tumble_exact::{
+    FloatControls, PassError, SpirvError, exact, float_controls, inexact, no_contraction,
+    no_contraction_of_halves, nontemporal_stores, splat_products, texel_buffers,
+    without_decorations, workgroup_layouts,
 };
 
-const ALL_CONTROLS: FloatControls = FloatControls {
-    preserve_signed_zero_inf_nan: true,
-    round_to_nearest_even: true,
-};
+/// All that a device may offer.
+pub(crate) fn all_controls() -> FloatControls {
+    FloatControls::default()
+        .with_preserve_signed_zero_inf_nan(true)
+        .with_round_to_nearest_even(true)
+}
+
+/// The name of the operation for which a module was refused.
+fn refused(result: Result<Vec<u32>, PassError>) -> String {
+    match result {
+        Err(PassError::Inexact(found)) => found.name,
+        other => panic!("{other:?}"),
+    }
+}
 
 fn words(bytes: &[u8]) -> Vec<u32> {
     bytes
@@ -135,10 +141,7 @@ fn vectors_times_scalars_become_products_of_vectors() {
     let (times_scalar, multiply, construct) = (142, 133, 80);
     let found = count(&module, times_scalar);
     assert!(found >= 2, "naga wrote {found}");
-    assert!(matches!(
-        no_contraction(&module),
-        Err(PassError::Inexact { opcode: 142, .. })
-    ));
+    assert_eq!(refused(no_contraction(&module)), "OpVectorTimesScalar");
     let passed = splat_products(&module).unwrap();
     validate("splats", "vulkan1.1", &passed);
     assert_eq!(count(&passed, times_scalar), 0);
@@ -188,10 +191,58 @@ fn inexact_operations_are_refused() {
     ] {
         let error = no_contraction(&kernel_of(expression)).unwrap_err();
         assert!(
-            matches!(error, PassError::Inexact { .. }),
+            matches!(error, PassError::Inexact(_)),
             "{expression}: {error}"
         );
     }
+}
+
+/// All operations are listed, each with its name and the line of the source. Integers, and sets of instructions that
+/// compute nothing, are no fault.
+#[test]
+fn every_inexact_operation_is_listed() {
+    let wgsl = "@group(0) @binding(0) var<storage, read_write> values: array<f32>;
+@group(0) @binding(1) var<storage, read_write> indices: array<u32>;
+@compute @workgroup_size(1) fn main() {
+    values[0] = values[1] / values[2];
+    indices[0] = min(indices[1], countTrailingZeros(indices[2]));
+    values[3] = sqrt(values[4]) + 3.0 * values[5];
+}";
+    let module = naga::front::wgsl::parse_str(wgsl).unwrap();
+    let info = Validator::new(ValidationFlags::all(), Capabilities::empty())
+        .validate(&module)
+        .unwrap();
+    let options = spv::Options {
+        debug_info: Some(spv::DebugInfo {
+            source_code: wgsl,
+            file_name: "kernel.wgsl",
+            language: spv::SourceLanguage::WGSL,
+        }),
+        ..spv::Options::default()
+    };
+    let words = spv::write_vec(&module, &info, &options, None).unwrap();
+    let found = inexact(&words, false).unwrap();
+    let found: Vec<_> = found.iter().map(|one| (&*one.name, one.line)).collect();
+    assert_eq!(found, [("OpFDiv", Some(4)), ("Sqrt", Some(6))]);
+    let error = exact(&words).unwrap_err().to_string();
+    assert!(error.starts_with("line 4: OpFDiv, at word "), "{error}");
+
+    // A set of instructions of a debugger, and one that nobody knows.
+    let imported = |set: &str| {
+        let mut name: Vec<u8> = set.bytes().collect();
+        name.resize(name.len() / 4 * 4 + 4, 0);
+        let name = name
+            .chunks_exact(4)
+            .map(|c| u32::from_le_bytes([c[0], c[1], c[2], c[3]]));
+        let mut words = vec![0x0723_0203, 0x1_0300, 0, 9, 0];
+        words.push(((2 + set.len() as u32 / 4 + 1) << 16) | 11);
+        words.push(1);
+        words.extend(name);
+        words.extend([5 << 16 | 12, 2, 3, 1, 1]);
+        inexact(&words, false).unwrap().len()
+    };
+    assert_eq!(imported("NonSemantic.DebugPrintf"), 0);
+    assert_eq!(imported("GLSL.std.999"), 1);
 }
 
 /// With every combination of controls that a device may report.
@@ -200,10 +251,9 @@ fn the_validator_accepts_every_shader() {
     let environments = ["vulkan1.1", "vulkan1.2"];
     for (name, code) in tumble::vulkan::kernels() {
         for controls in 0..4 {
-            let offered = FloatControls {
-                preserve_signed_zero_inf_nan: controls & 1 != 0,
-                round_to_nearest_even: controls & 2 != 0,
-            };
+            let offered = FloatControls::default()
+                .with_preserve_signed_zero_inf_nan(controls & 1 != 0)
+                .with_round_to_nearest_even(controls & 2 != 0);
             let module = float_controls(&words(code), offered).unwrap();
             // Halves are in Vulkan from 1.2 on.
             let is_later = usize::from(name.ends_with("_converting"));
@@ -244,7 +294,7 @@ fn validate(name: &str, environment: &str, module: &[u32]) {
 #[test]
 fn controls_reach_every_entry_point() {
     for (name, code) in tumble::vulkan::kernels() {
-        let module = float_controls(&words(code), ALL_CONTROLS).unwrap();
+        let module = float_controls(&words(code), all_controls()).unwrap();
         let modes: Vec<_> = instructions(&module)
             .into_iter()
             .filter(|(opcode, operands)| *opcode == 16 && operands.len() == 3)
@@ -345,13 +395,13 @@ fn conversions_to_halves_ask_for_their_rounding() {
          @group(0) @binding(1) var<storage, read_write> halves: array<f16>;
          @compute @workgroup_size(1) fn main() { halves[0] = f16(values[0] * values[1]); }",
     );
-    let refused = PassError::FloatWidth { bits: 16 };
-    assert_eq!(no_contraction(&module), Err(refused));
+    assert_eq!(refused(no_contraction(&module)), "a float of 16 bits");
     let double = compile(
         "@group(0) @binding(0) var<storage, read_write> values: array<f64>;
          @compute @workgroup_size(1) fn main() { values[0] = f64(f32(values[1])); }",
     );
-    assert_eq!(of_halves(&double), Err(PassError::FloatWidth { bits: 64 }));
+    let double = no_contraction_of_halves(&double);
+    assert_eq!(refused(double), "a float of 64 bits");
     let found = |module: &[u32]| {
         let all = instructions(module);
         let conversions = all.iter().filter(|one| one.0 == CONVERSION).count();
@@ -359,7 +409,10 @@ fn conversions_to_halves_ask_for_their_rounding() {
         let has = |mode: [u32; 2]| modes.clone().any(|one| one.1[1..] == mode);
         (conversions, MODES.map(has))
     };
-    assert_eq!(found(&of_halves(&module).unwrap()), (1, [true; 2]));
+    assert_eq!(
+        found(&no_contraction_of_halves(&module).unwrap()),
+        (1, [true; 2])
+    );
     let mut converting = 0;
     for (name, code) in tumble::vulkan::kernels() {
         let (conversions, modes) = found(&words(code));
@@ -433,17 +486,14 @@ fn what_is_no_module_is_refused() {
     let header = [0x0723_0203, 0x1_0300, 0, 1, 0];
     assert_eq!(no_contraction(&header), Err(SpirvError::Incomplete.into()));
     assert_eq!(
-        float_controls(&header, ALL_CONTROLS),
+        float_controls(&header, all_controls()),
         Err(SpirvError::Incomplete)
     );
     let cut = [&header[..], &[9 << 16 | 17]].concat();
     let truncated = SpirvError::Truncated { word: 5 };
     assert_eq!(no_contraction(&cut), Err(truncated.into()));
     let double = [&header[..], &[3 << 16 | 22, 1, 64]].concat();
-    assert_eq!(
-        no_contraction(&double),
-        Err(PassError::FloatWidth { bits: 64 })
-    );
+    assert_eq!(refused(no_contraction(&double)), "a float of 64 bits");
 }
 
 proptest! {
@@ -464,7 +514,7 @@ proptest! {
             module[0] = 0x0723_0203;
         }
         let _ = no_contraction(&module);
-        let _ = float_controls(&module, ALL_CONTROLS);
+        let _ = float_controls(&module, all_controls());
         let _ = without_decorations(&module);
         let _ = texel_buffers(&module);
         let _ = texel_buffers(&module);
@@ -480,7 +530,7 @@ proptest! {
             let offset = offset % module.len();
             module[offset] = value;
             let _ = no_contraction(&module);
-            let _ = float_controls(&module, ALL_CONTROLS);
+            let _ = float_controls(&module, all_controls());
             let _ = texel_buffers(&module);
             let _ = texel_buffers(&module);
             let _ = splat_products(&module);

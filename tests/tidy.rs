@@ -37,6 +37,7 @@ fn unsafe_code_stays_in_its_homes() {
         "npm/src",
         "python/src",
         "shader-compiler/src",
+        "exact/src",
     ]
     .map(|folder| files(folder, "rs"));
     for path in sources.concat() {
@@ -72,7 +73,8 @@ const REASON_WITHIN: usize = 6;
 #[test]
 fn no_multiply_add_is_fused_and_unsafe_code_has_its_reason() {
     let folders = ["src", "formats/src", "routes/src", "cli/src", "capi/src"];
-    let folders = (folders.into_iter()).chain(["npm/src", "python/src", "shader-compiler/src"]);
+    let folders =
+        (folders.into_iter()).chain(["exact/src", "npm/src", "python/src", "shader-compiler/src"]);
     let mut unsafe_lines = 0;
     for path in folders.flat_map(|folder| files(folder, "rs")) {
         let text = read(&path);
@@ -162,6 +164,7 @@ fn results_take_no_function_that_differs_from_system_to_system() {
         "capi/src",
         "npm/src",
         "python/src",
+        "exact/src",
     ];
     let (mut lines, mut exceptions) = (0, 0);
     for path in folders.iter().flat_map(|folder| files(folder, "rs")) {
@@ -492,7 +495,7 @@ fn the_oldest_rust_is_declared_once() {
 #[test]
 fn packages_have_all_that_they_include() {
     let mut found = 0;
-    for package in ["", "formats/", "routes/", "cli/"] {
+    for package in ["", "exact/", "formats/", "routes/", "cli/"] {
         let home = root().join(package);
         for path in files(&format!("{package}src"), "rs") {
             // Tests are run in the repository.
@@ -509,6 +512,7 @@ fn packages_have_all_that_they_include() {
                         [
                             "src",
                             "shaders",
+                            "functions.wgsl",
                             "docs/library.md",
                             "docs/your-tests.md",
                             "README.md",
@@ -715,7 +719,8 @@ fn retired_identifiers(text: &str) -> Vec<(usize, &str)> {
 }
 
 /// Every folder with Rust sources.
-const SOURCES: [&str; 13] = [
+const SOURCES: [&str; 14] = [
+    "exact",
     "src",
     "tests",
     "examples",

@@ -5,16 +5,11 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 
 use clap::Parser;
 use glam::Quat;
-#[allow(dead_code, unreachable_pub)] // the shaders' compiler has it
-#[path = "../../shader-compiler/src/exactness.rs"]
-mod exactness;
-
-use exactness::no_contraction;
-use exactness::spirv::{FloatControls, float_controls, without_decorations};
 use tumble::{
     Device, Encoding, Engine, FrameRate, Interpolation, KeySigns, Layout, MAX_FRAMES, METHODS,
     SampleTimes, Speed, TrackSet, WrapMode,
 };
+use tumble_exact::{FloatControls, exact, float_controls, inexact, without_decorations};
 use tumble_formats::csv::CsvWriter;
 use tumble_formats::npy::NpyWriter;
 use tumble_formats::quaternion::ComponentOrder;
@@ -362,15 +357,15 @@ pub(crate) fn spirv(bytes: &[u8]) -> u64 {
         .chunks_exact(4)
         .map(|c| u32::from_le_bytes([c[0], c[1], c[2], c[3]]))
         .collect();
-    let controls = FloatControls {
-        preserve_signed_zero_inf_nan: true,
-        round_to_nearest_even: true,
-    };
+    let controls = FloatControls::default()
+        .with_preserve_signed_zero_inf_nan(true)
+        .with_round_to_nearest_even(true);
     let _ = float_controls(&module, controls);
     let bare = without_decorations(&module);
-    match no_contraction(&module) {
+    match exact(&module) {
         Ok(passed) => {
-            assert_eq!(no_contraction(&passed).as_ref(), Ok(&passed));
+            assert_eq!(exact(&passed).as_ref(), Ok(&passed));
+            assert_eq!(inexact(&passed, false), Ok(Vec::new()));
             assert!(without_decorations(&passed).is_ok());
             signature((true, bare.is_ok(), passed.len().min(64)))
         }

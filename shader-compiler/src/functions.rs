@@ -15,6 +15,7 @@ use std::fmt::Write as _;
 use std::io::Write as _;
 use std::process::{Command, Stdio};
 
+use crate::rust::Declared;
 use naga::valid::{FunctionInfo, ModuleInfo};
 use naga::{
     ArraySize, BinaryOperator, Block, Expression, Function, Handle, Literal, LocalVariable, Module,
@@ -62,6 +63,22 @@ const FUNCTIONS: [(&str, &[&str]); 37] = [
     ("canonical_product", &[]),
     ("small_angle_cubic", &[]),
 ];
+
+/// The functions that `tumble-exact` offers to other shaders, with those that they call, and the files that have them.
+const EXACT_FUNCTIONS: [&str; 9] = [
+    "flushed",
+    "magnitude",
+    "reciprocal",
+    "reciprocal_root",
+    "root",
+    "acute_arc_tangent",
+    "arc_tangent",
+    "sine_cosine",
+    "sine_cosm1",
+];
+
+/// The shader files of [`EXACT_FUNCTIONS`].
+pub(crate) const EXACT_FILES: [&str; 2] = ["math/sine_cosine", "math/arc_tangent"];
 
 /// Functions that Rust has already, and which those of the list call: the algebra that f64 shares. They take any
 /// numbers.
@@ -255,6 +272,37 @@ impl Functions {
         text.extend(functions.into_iter().map(String::as_str));
         formatted(&text)
     }
+
+    /// The file of `tumble-exact`: some of the functions with the constants that they use.
+    ///
+    /// # Panics
+    /// If a function of the list is in no shader.
+    pub(crate) fn exact_rust(&self, declared: &Declared) -> String {
+        let functions: String = EXACT_FUNCTIONS
+            .iter()
+            .map(|name| self.functions[*name].1.as_str())
+            .collect();
+        let constants = declared.constants(|name| uses(&functions, name));
+        let header = "//! Written by `cargo run -p tumble-shaders` from the shaders: change those.\n\n\
+             #![allow(clippy::approx_constant)] // The shaders write pi in two parts.\n\n\
+             use crate::functions::Number;\n\n";
+        formatted(&format!("{header}{constants}\n{functions}"))
+    }
+}
+
+/// The functions of `tumble-exact` as WGSL, without comments on the engine's files.
+pub(crate) fn exact_wgsl(files: &[String]) -> String {
+    let mut text = String::from(
+        "// Written by `cargo run -p tumble-shaders` from the engine's shaders: change those.\n\n",
+    );
+    let lines = files.iter().flat_map(|file| file.lines());
+    for line in lines.filter(|line| !line.starts_with("// Twin: ")) {
+        text.push_str(line);
+        text.push('\n');
+    }
+    text.truncate(text.trim_end().len());
+    text.push('\n');
+    text
 }
 
 /// The comment above a function, as Rust's documentation.

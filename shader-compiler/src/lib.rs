@@ -7,8 +7,6 @@
 //! the SPIR-V that was tested. `cargo run -p tumble-shaders` writes it anew.
 
 mod entries;
-#[allow(unreachable_pub)] // tests and fuzzing include it
-mod exactness;
 mod functions;
 // The engine's build script uses the same file, but another part of it.
 #[allow(dead_code)]
@@ -28,6 +26,10 @@ use naga::back::spv;
 use naga::front::wgsl::{Frontend, Options};
 use naga::valid::{Capabilities, GlobalUse, ModuleInfo, ValidationFlags, Validator};
 use naga::{Binding, BuiltIn};
+use tumble_exact::{
+    PassError, no_contraction, no_contraction_of_halves, nontemporal_stores, splat_products,
+    texel_buffers, workgroup_layouts,
+};
 
 use entries::Source;
 use functions::Functions;
@@ -121,11 +123,20 @@ fn compile() -> Files {
         ),
         ("shaders/compiled/kernels.rs", rust.into_bytes()),
         ("shaders/compiled/kernels.spv", code),
+        (
+            "exact/src/generated.rs",
+            functions.exact_rust(&declared).into_bytes(),
+        ),
+        (
+            "exact/functions.wgsl",
+            functions::exact_wgsl(&functions::EXACT_FILES.map(read_shader)).into_bytes(),
+        ),
     ];
     let mut hashes = hashes::of_folder(Path::new(ROOT), "shaders").expect("the shaders lie there");
     hashes.retain(|path, _| path.ends_with(".wgsl"));
-    let made = files
-        .iter()
+    // The engine's build looks at its shaders alone.
+    let made = (files.iter())
+        .filter(|(path, _)| path.starts_with("shaders/"))
         .map(|(path, bytes)| ((*path).to_owned(), hashes::hash(bytes)));
     hashes.extend(made);
     let list: String = hashes
@@ -318,21 +329,19 @@ impl Module {
         };
         let words = spv::write_vec(parsed, info, &options, None)
             .unwrap_or_else(|error| panic!("{name}: {error}"));
-        let words =
-            exactness::texel_buffers(&words).unwrap_or_else(|error| panic!("{name}: {error}"));
-        let words =
-            exactness::workgroup_layouts(&words).unwrap_or_else(|error| panic!("{name}: {error}"));
-        let words =
-            exactness::splat_products(&words).unwrap_or_else(|error| panic!("{name}: {error}"));
-        let words = match converts {
-            true => exactness::of_halves(&words),
-            false => exactness::no_contraction(&words),
+        let pass = || {
+            let words = texel_buffers(&words)?;
+            let words = workgroup_layouts(&words)?;
+            let words = splat_products(&words)?;
+            let words = match converts {
+                true => no_contraction_of_halves(&words)?,
+                false => no_contraction(&words)?,
+            };
+            match streams_results {
+                true => Ok(nontemporal_stores(&words)?),
+                false => Ok(words),
+            }
         };
-        let words = words.unwrap_or_else(|error| panic!("{name}: {error}"));
-        match streams_results {
-            true => exactness::nontemporal_stores(&words)
-                .unwrap_or_else(|error| panic!("{name}: {error}")),
-            false => words,
-        }
+        pass().unwrap_or_else(|error: PassError| panic!("{name}: {error}"))
     }
 }

@@ -89,14 +89,21 @@ impl Declared {
         structs.map(|(name, _)| name.clone()).collect()
     }
 
+    /// Constants as Rust, those of the names that are asked for.
+    pub(crate) fn constants(&self, is_used: impl Fn(&str) -> bool) -> String {
+        let mut text = String::new();
+        for (name, value) in self.constants.iter().filter(|(name, _)| is_used(name)) {
+            writeln!(text, "pub(crate) const {name}: {value};").unwrap();
+        }
+        text
+    }
+
     /// Constants and structs as Rust.
     pub(crate) fn rust(&self) -> String {
         let mut text = String::from(
             "// Written by `cargo run -p tumble-shaders` from the shaders: change those.\n\n",
         );
-        for (name, value) in &self.constants {
-            writeln!(text, "pub(crate) const {name}: {value};").unwrap();
-        }
+        text.push_str(&self.constants(|_| true));
         for rust in self.structs.values().filter_map(|item| item.rust.as_ref()) {
             text.push_str(rust);
         }

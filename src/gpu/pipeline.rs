@@ -10,6 +10,7 @@ use crate::machine::error::VulkanError;
 use crate::machine::error::calls::Named;
 use crate::shader::{Access, Kernel, spirv};
 use crate::work::recording::MAX_PUSHED;
+use tumble_exact::{float_controls, without_decorations};
 
 /// A compute pipeline with its layouts.
 pub(crate) struct Pipeline {
@@ -30,8 +31,8 @@ pub(crate) struct Pipeline {
 /// The code of a kernel as it is passed to the driver.
 fn words(device: &LogicalDevice, code: &[u32], exactness: Exactness) -> Vec<u32> {
     let words = match exactness {
-        Exactness::Demanded => spirv::float_controls(code, device.physical.float_controls),
-        Exactness::LeftToTheDriver => spirv::without_decorations(code),
+        Exactness::Demanded => float_controls(code, device.physical.float_controls),
+        Exactness::LeftToTheDriver => without_decorations(code),
     };
     words.expect("the kernels passed when they were compiled")
 }

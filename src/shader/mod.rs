@@ -1,8 +1,7 @@
 //! Constants, buffer structs and kernels (as SPIR-V, by name) that the shaders share with Rust, as the shader
 //! compiler wrote them into `shaders/compiled`.
 
-// The compiler of the shaders (`shader-compiler/`) has its own copy of the pass, and uses more of it.
-#[allow(dead_code, unreachable_pub)]
+#[cfg(feature = "vulkan")]
 pub(crate) mod spirv;
 
 mod generated {

@@ -8,9 +8,9 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use crate::spirv::exactness::spirv::{FloatControls, float_controls, without_decorations};
 use ash::{khr, vk};
 use tumble::Device;
+use tumble_exact::{FloatControls, float_controls, without_decorations};
 
 /// Where the child writes its listings.
 const FOLDER: &str = "MESA_LISTINGS";
@@ -69,10 +69,9 @@ impl Compiler {
             panic!("one driver with one device, not {devices:?}");
         };
         let info = device.info();
-        let controls = FloatControls {
-            preserve_signed_zero_inf_nan: info.preserves_signed_zero_inf_nan,
-            round_to_nearest_even: info.rounds_to_nearest_even,
-        };
+        let controls = FloatControls::default()
+            .with_preserve_signed_zero_inf_nan(info.preserves_signed_zero_inf_nan)
+            .with_round_to_nearest_even(info.rounds_to_nearest_even);
         println!("{}, {}, {controls:?}", info.name, info.driver);
         // SAFETY: plain creation; everything is destroyed in `drop`, and what is chained lives
         // until the call is over.

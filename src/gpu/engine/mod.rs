@@ -40,12 +40,12 @@ use crate::output::encoding::Encoding;
 use crate::output::rotations::{Layout, Storage};
 use crate::output::window::Window;
 use crate::prepare::clip_data::ClipData;
-use crate::shader::spirv::FloatControls;
 use crate::shader::{Item, KERNELS, Kernel, KernelCode, List};
 use crate::simd::dispatch::VectorWidth;
 use crate::threads::exclusive::Exclusive;
 use crate::threads::{copy, lock};
 use crate::work::lists::ListRequest;
+use tumble_exact::FloatControls;
 
 /// The number of rotations of one window, 32 MiB, unless the device's limits, the memory budget or the device's speed
 /// require fewer.

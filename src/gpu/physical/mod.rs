@@ -23,7 +23,7 @@ use crate::machine::error::calls::Named;
 use crate::machine::options::{EngineOptions, Mapping, Reads, Transfer};
 pub(crate) use crate::machine::reports::{DeviceInfo, DeviceKind};
 use crate::shader::MAX_SUBGROUP_POSITIONS;
-use crate::shader::spirv::FloatControls;
+use tumble_exact::FloatControls;
 
 /// Bytes of one texel of the texel buffers that kernels read.
 const TEXEL_BYTES: u64 = 16;
@@ -185,11 +185,11 @@ impl PhysicalDevice {
         ];
         let converts_halves = converts_halves.iter().all(|is_there| *is_there == vk::TRUE)
             && controls.denorm_behavior_independence != vk::ShaderFloatControlsIndependence::NONE;
-        let float_controls = FloatControls {
-            preserve_signed_zero_inf_nan: controls.shader_signed_zero_inf_nan_preserve_float32
-                == vk::TRUE,
-            round_to_nearest_even: controls.shader_rounding_mode_rte_float32 == vk::TRUE,
-        };
+        let float_controls = FloatControls::default()
+            .with_preserve_signed_zero_inf_nan(
+                controls.shader_signed_zero_inf_nan_preserve_float32 == vk::TRUE,
+            )
+            .with_round_to_nearest_even(controls.shader_rounding_mode_rte_float32 == vk::TRUE);
         let limits = &properties.limits;
         let text = |name: Result<&std::ffi::CStr, _>| {
             name.map(|name| name.to_string_lossy().into_owned())

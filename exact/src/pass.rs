@@ -1,88 +1,36 @@
-//! The exactness pass: what makes a driver round each operation once, as written.
+//! The pass: what makes a driver round each operation once, as written.
 //!
-//! naga emits neither `NoContraction` nor the float-control execution modes, and
-//! without them a driver may fuse a multiplication with an addition or rewrite
-//! `(a + b) - a` to `b`. This pass works on the words of a module: it decorates
-//! every float arithmetic instruction, and refuses a module that uses an operation
-//! whose rounding Vulkan leaves open. The engine adds the modes that a device reports.
+//! Compilers of shaders emit neither `NoContraction` nor the float-control execution modes unless they are asked to. Without
+//! them a driver may fuse a multiplication with an addition, or rewrite `(a + b) - a` to `b`. The pass decorates every float
+//! operation, and refuses a module that uses an operation whose rounding Vulkan leaves open.
 //!
 //! Vectors times scalars have an opcode of their own, which translators of SPIR-V treat apart: SPIRV-Cross,
-//! by which Metal runs these modules, drops `NoContraction` on it. They become products of two vectors.
+//! by which Metal runs SPIR-V, drops `NoContraction` on it. They become products of two vectors.
 
 use std::collections::{BTreeMap, BTreeSet};
 
-// The engine uses the same file, but other parts of it.
-#[allow(dead_code, unreachable_pub)]
-#[path = "../../src/shader/spirv.rs"]
-pub(crate) mod spirv;
+use crate::controls::{Mode, with_modes};
+use crate::operations::{Inexact, inexact};
+use crate::spirv::{HEADER_WORDS, SpirvError, instruction_word, instructions, op};
 
-use spirv::{HEADER_WORDS, NO_CONTRACTION, SpirvError, instruction_word, instructions, op};
-
-// Opcodes that only the exactness pass needs.
-const NAME_LAST: [u16; 6] = [3, 4, 5, 6, 7, 330]; // OpSource … OpModuleProcessed
-const EXT_INST_IMPORT: u16 = 11;
-const EXT_INST: u16 = 12;
-const MEMORY_MODEL: u16 = 14;
-const TYPE_FLOAT: u16 = 22;
-const TYPE_VECTOR: u16 = 23;
-const TYPE_IMAGE: u16 = 25;
-const TYPE_ARRAY: u16 = 28;
-const TYPE_RUNTIME_ARRAY: u16 = 29;
-const TYPE_STRUCT: u16 = 30;
-const TYPE_POINTER: u16 = 32;
-const LOAD: u16 = 61;
-const STORE: u16 = 62;
-const ACCESS_CHAIN: u16 = 65;
-const MEMBER_DECORATE: u16 = 72;
-const COMPOSITE_CONSTRUCT: u16 = 80;
-const IMAGE_FETCH: u16 = 95;
-const EXECUTION_MODE_ID: u16 = 331;
+/// The decoration.
+pub(crate) const NO_CONTRACTION: u32 = 42;
 /// The storage class of storage buffers.
 const STORAGE_BUFFER: u32 = 12;
+const NAME_LAST: [u16; 6] = [3, 4, 5, 6, 7, 330]; // OpSource … OpModuleProcessed
 /// Correctly rounded by Vulkan ("Precision and Operation of SPIR-V Instructions").
-const EXACT: [u16; 4] = [127, 129, 131, MULTIPLY]; // FNegate FAdd FSub FMul
-const MULTIPLY: u16 = 133;
-const F_CONVERT: u16 = 115;
-const VECTOR_TIMES_SCALAR: u16 = 142;
-/// Float arithmetic with a looser bound, conversions that round freely, and what [`splat_products`]
-/// leaves nothing of.
-const INEXACT: [u16; 20] = [
-    109,
-    110,
-    115,
-    116, // ConvertFToU ConvertFToS FConvert QuantizeToF16
-    136,
-    140,
-    141, // FDiv FRem FMod
-    VECTOR_TIMES_SCALAR,
-    143,
-    144,
-    145,
-    146,
-    147,
-    148, // matrix products, OuterProduct, Dot
-    207,
-    208,
-    209,
-    215, // DPdx DPdy Fwidth and relatives
-    350,
-    352, // GroupNonUniformFAdd, FMul: in any order
-];
+const EXACT: [u16; 4] = [127, 129, 131, op::MULTIPLY]; // FNegate FAdd FSub FMul
 
 /// Why the pass refuses a module.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum PassError {
     /// It is no complete module.
     #[error(transparent)]
     Spirv(#[from] SpirvError),
-    /// An instruction whose result Vulkan does not define to the last bit.
-    #[error("opcode {opcode} at word {word} does not round exactly; use only + - * and integers")]
-    Inexact {
-        /// Offset of the instruction in words.
-        word: usize,
-        /// Its opcode.
-        opcode: u16,
-    },
+    /// An operation whose result Vulkan does not define to the last bit. [`inexact`](crate::inexact) lists all of them.
+    #[error("{0}; use only + - * on f32, comparisons and integers")]
+    Inexact(Inexact),
     /// A type that a buffer and a workgroup share, of which one needs a layout that the other forbids.
     #[error(
         "type %{id} is used in a buffer and in workgroup memory; declare one of its own for each"
@@ -91,12 +39,17 @@ pub enum PassError {
         /// The id of the type.
         id: u32,
     },
-    /// A floating-point type other than 32 bits wide.
-    #[error("a float type of {bits} bits; only 32 are exact everywhere")]
-    FloatWidth {
-        /// Its width in bits.
-        bits: u32,
-    },
+}
+
+/// The whole pass for a module of any compiler: [`splat_products`] and [`no_contraction`].
+///
+/// Add the modes of a device by [`float_controls`](crate::float_controls) when the module is loaded on it.
+///
+/// # Errors
+/// A [`PassError`] for words that are no module, and for a module that computes anything whose last bit Vulkan leaves
+/// open.
+pub fn exact(module: &[u32]) -> Result<Vec<u32>, PassError> {
+    no_contraction(&splat_products(module)?)
 }
 
 /// Decorates the result of every float arithmetic instruction with
@@ -114,38 +67,29 @@ pub fn no_contraction(module: &[u32]) -> Result<Vec<u32>, PassError> {
 ///
 /// # Errors
 /// As for [`no_contraction`].
-pub fn of_halves(module: &[u32]) -> Result<Vec<u32>, PassError> {
+pub fn no_contraction_of_halves(module: &[u32]) -> Result<Vec<u32>, PassError> {
     const DENORM_PRESERVE: [u32; 2] = [4464, 4459]; // the capability and the mode
     const ROUND_TO_NEAREST_EVEN: [u32; 2] = [4467, 4462];
     let words = decorated(module, true)?;
-    let modes = [DENORM_PRESERVE, ROUND_TO_NEAREST_EVEN].map(|[capability, mode]| spirv::Mode {
+    let modes = [DENORM_PRESERVE, ROUND_TO_NEAREST_EVEN].map(|[capability, mode]| Mode {
         capability,
         mode,
         width: 16,
     });
-    Ok(spirv::with_modes(&words, &modes)?)
+    Ok(with_modes(&words, &modes)?)
 }
 
 fn decorated(module: &[u32], converts: bool) -> Result<Vec<u32>, PassError> {
+    if let Some(first) = inexact(module, converts)?.into_iter().next() {
+        return Err(PassError::Inexact(first));
+    }
     let code = instructions(module)?;
     let mut results = BTreeSet::new();
     let mut decorated = BTreeSet::new();
     for instruction in &code {
-        let (word, opcode) = (instruction.start, instruction.opcode);
-        match (opcode, instruction.words) {
-            (TYPE_FLOAT, &[_, _, bits, ..]) if bits != 32 && !(bits == 16 && converts) => {
-                return Err(PassError::FloatWidth { bits });
-            }
-            // All built-in functions of GLSL.std.450 (EXT_INST) that naga would write for our shaders round freely, so
-            // they are refused.
-            (F_CONVERT, _) if converts => {}
-            _ if opcode == EXT_INST || INEXACT.contains(&opcode) => {
-                return Err(PassError::Inexact { word, opcode });
-            }
-            _ if EXACT.contains(&opcode) => {
-                results.insert(instruction.word(2)?);
-            }
-            _ => decorated.extend(instruction.decorated()),
+        match EXACT.contains(&instruction.opcode) {
+            true => _ = results.insert(instruction.word(2)?),
+            false => decorated.extend(instruction.decorated()),
         }
     }
     let additions: Vec<u32> = results
@@ -173,10 +117,10 @@ pub fn splat_products(module: &[u32]) -> Result<Vec<u32>, SpirvError> {
     let mut components = BTreeMap::new();
     for instruction in instructions(module)? {
         match (instruction.opcode, instruction.words) {
-            (TYPE_VECTOR, &[_, id, _, count]) => {
+            (op::TYPE_VECTOR, &[_, id, _, count]) => {
                 components.insert(id, count);
             }
-            (VECTOR_TIMES_SCALAR, &[_, kind, id, vector, scalar]) => {
+            (op::VECTOR_TIMES_SCALAR, &[_, kind, id, vector, scalar]) => {
                 // A vector has 2, 3 or 4 components.
                 let count = components
                     .get(&kind)
@@ -185,12 +129,12 @@ pub fn splat_products(module: &[u32]) -> Result<Vec<u32>, SpirvError> {
                 let splat = words[BOUND];
                 words[BOUND] = splat.checked_add(1).ok_or(SpirvError::Incomplete)?;
                 words.extend([
-                    instruction_word(COMPOSITE_CONSTRUCT, 3 + count),
+                    instruction_word(op::COMPOSITE_CONSTRUCT, 3 + count),
                     kind,
                     splat,
                 ]);
                 words.extend((0..count).map(|_| scalar));
-                words.extend([instruction_word(MULTIPLY, 5), kind, id, vector, splat]);
+                words.extend([instruction_word(op::MULTIPLY, 5), kind, id, vector, splat]);
                 continue;
             }
             _ => {}
@@ -219,16 +163,16 @@ pub fn texel_buffers(module: &[u32]) -> Result<Vec<u32>, SpirvError> {
         words.extend_from_slice(instruction.words);
         match (instruction.opcode, instruction.words) {
             (op::CAPABILITY, [_, SAMPLED_1D]) => words[first + 1] = SAMPLED_BUFFER,
-            (TYPE_IMAGE, [_, id, _, 0, ..]) => {
+            (op::TYPE_IMAGE, [_, id, _, 0, ..]) => {
                 words[first + 3] = BUFFER;
                 buffers.insert(*id);
             }
-            (LOAD, [_, kind, id, ..]) if buffers.contains(kind) => {
+            (op::LOAD, [_, kind, id, ..]) if buffers.contains(kind) => {
                 buffers.insert(*id);
             }
-            (IMAGE_FETCH, [_, _, _, image, _, ..]) if buffers.contains(image) => {
+            (op::IMAGE_FETCH, [_, _, _, image, _, ..]) if buffers.contains(image) => {
                 words.truncate(first + FETCH_WORDS);
-                words[first] = instruction_word(IMAGE_FETCH, FETCH_WORDS as u32);
+                words[first] = instruction_word(op::IMAGE_FETCH, FETCH_WORDS as u32);
             }
             _ => {}
         }
@@ -253,13 +197,13 @@ pub fn workgroup_layouts(module: &[u32]) -> Result<Vec<u32>, PassError> {
     let (mut shared, mut laid_out) = (BTreeSet::new(), BTreeSet::new());
     for instruction in &code {
         match (instruction.opcode, instruction.words) {
-            (TYPE_ARRAY | TYPE_RUNTIME_ARRAY, [_, id, element, ..]) => {
+            (op::TYPE_ARRAY | op::TYPE_RUNTIME_ARRAY, [_, id, element, ..]) => {
                 parts.insert(*id, std::slice::from_ref(element));
             }
-            (TYPE_STRUCT, [_, id, members @ ..]) => {
+            (op::TYPE_STRUCT, [_, id, members @ ..]) => {
                 parts.insert(*id, members);
             }
-            (TYPE_POINTER, [_, _, class, to]) => {
+            (op::TYPE_POINTER, [_, _, class, to]) => {
                 let found = match *class {
                     WORKGROUP => &mut shared,
                     UNIFORM | PUSH_CONSTANT | STORAGE_BUFFER => &mut laid_out,
@@ -279,7 +223,7 @@ pub fn workgroup_layouts(module: &[u32]) -> Result<Vec<u32>, PassError> {
     for instruction in &code {
         let layout_of = match (instruction.opcode, instruction.words) {
             (op::DECORATE, [_, id, decoration, ..]) if LAYOUT.contains(decoration) => Some(*id),
-            (MEMBER_DECORATE, [_, id, _, decoration, ..]) if LAYOUT.contains(decoration) => {
+            (op::MEMBER_DECORATE, [_, id, _, decoration, ..]) if LAYOUT.contains(decoration) => {
                 Some(*id)
             }
             _ => None,
@@ -305,14 +249,14 @@ pub fn nontemporal_stores(module: &[u32]) -> Result<Vec<u32>, SpirvError> {
     let mut pointers = BTreeSet::new();
     for instruction in instructions(module)? {
         match (instruction.opcode, instruction.words) {
-            (TYPE_POINTER, &[_, id, STORAGE_BUFFER, _]) => {
+            (op::TYPE_POINTER, &[_, id, STORAGE_BUFFER, _]) => {
                 pointers.insert(id);
             }
-            (ACCESS_CHAIN, &[_, kind, id, ..]) if pointers.contains(&kind) => {
+            (op::ACCESS_CHAIN, &[_, kind, id, ..]) if pointers.contains(&kind) => {
                 pointers.insert(id);
             }
-            (STORE, &[_, pointer, value]) if pointers.contains(&pointer) => {
-                words.extend([instruction_word(STORE, 4), pointer, value, NONTEMPORAL]);
+            (op::STORE, &[_, pointer, value]) if pointers.contains(&pointer) => {
+                words.extend([instruction_word(op::STORE, 4), pointer, value, NONTEMPORAL]);
                 continue;
             }
             _ => {}
@@ -327,10 +271,10 @@ fn precedes_annotations(opcode: u16) -> bool {
         opcode,
         op::CAPABILITY
             | op::EXTENSION
-            | EXT_INST_IMPORT
-            | MEMORY_MODEL
+            | op::EXT_INST_IMPORT
+            | op::MEMORY_MODEL
             | op::ENTRY_POINT
             | op::EXECUTION_MODE
-            | EXECUTION_MODE_ID
+            | op::EXECUTION_MODE_ID
     ) || NAME_LAST.contains(&opcode)
 }
