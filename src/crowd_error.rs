@@ -43,6 +43,22 @@ pub enum CrowdError {
     /// The skeleton has no joints.
     #[error("the skeleton has no joints; a crowd has at least one")]
     NoJoints,
+    /// An event is after the end of its clip.
+    #[error("the event is at tick {tick}, after the clip's last tick, {ticks}")]
+    EventTick {
+        /// The tick of the event.
+        tick: u32,
+        /// The clip's length, ticks.
+        ticks: u32,
+    },
+    /// Events are asked for after a time that is yet to come.
+    #[error("events since {since} ticks, but the clock is at {clock}; give an earlier time")]
+    EventsSince {
+        /// The time that was asked for, ticks.
+        since: u64,
+        /// The time of the clock, ticks.
+        clock: u64,
+    },
     /// The library has no clips.
     #[error("the library has no clips; push one")]
     NoClips,

@@ -145,14 +145,12 @@ impl CrowdLayer {
     /// The layer that an entry describes, at the clock's time `to` instead of `clock`; `to` may be earlier.
     pub(crate) fn moved(entry: &CrowdEntry, clips: &[CrowdClip], clock: u64, to: u64) -> Self {
         let modes = entry.speed_and_modes;
-        let units = i128::from(modes & SPEED_MAGNITUDE);
+        let units = modes & SPEED_MAGNITUDE;
         let backwards = modes & RUNS_BACKWARDS != 0;
         let clip = (entry.clip_and_weight & 0xffff) as usize;
         let (wrap, period) = ((modes >> 29) & 3, clips[clip].period);
-        let since = i128::from(elapsed(entry, clock)) + i128::from(to) - i128::from(clock);
-        let moved = if backwards { -units } else { units } * since;
-        let start = i128::from(entry.start) - i128::from(START_BIAS);
-        let ticks = ((start << 16) + moved) >> 16;
+        let later = position_later(entry, clock, i128::from(to) - i128::from(clock));
+        let ticks = later >> 16;
         let speed = units as f32 / SPEED_UNITS;
         Self {
             clip,
@@ -168,6 +166,21 @@ impl CrowdLayer {
             mask: (((modes >> 24) & 0x1f) as usize).checked_sub(1),
         }
     }
+}
+
+/// The position of an entry at a time of the clock that is not before its anchor: the time in the clip before wrapping, in units of 2^-16 ticks.
+pub(crate) fn clip_position(entry: &CrowdEntry, clock: u64) -> i128 {
+    position_later(entry, clock, 0)
+}
+
+/// The position of an entry some ticks later than a time of the clock, or before.
+fn position_later(entry: &CrowdEntry, clock: u64, ticks: i128) -> i128 {
+    let modes = entry.speed_and_modes;
+    let units = i128::from(modes & SPEED_MAGNITUDE);
+    let is_backwards = modes & RUNS_BACKWARDS != 0;
+    let start = i128::from(entry.start) - i128::from(START_BIAS);
+    let moved = units * (i128::from(elapsed(entry, clock)) + ticks);
+    (start << 16) + if is_backwards { -moved } else { moved }
 }
 
 impl CrowdEntry {

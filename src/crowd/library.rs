@@ -8,6 +8,7 @@ use rayon::prelude::*;
 
 use crate::crowd::clip_keys::KeyPrecision;
 use crate::crowd::clip_tables::{ClipTables, MAX_ENTRIES};
+use crate::crowd::events::ClipEvent;
 use crate::crowd::stages;
 use crate::crowd::states::MotionTables;
 use crate::crowd_error::{CrowdError, MAX_CLIPS, MAX_MASKS, MAX_TICKS};
@@ -66,6 +67,8 @@ pub struct CrowdLibrary {
     /// The reference poses, `[clip][joint]`: a rotation, a translation and the reciprocals of a scale.
     references: Vec<[f32; 4]>,
     ticks_per_second: u32,
+    /// Moments of clips, in the order in which they were added.
+    pub(crate) events: Vec<ClipEvent>,
     /// The names of the joints: those of the skeleton, else those of the first clip; `None` until one is known.
     joints: Option<Joints>,
 }
@@ -121,6 +124,7 @@ impl CrowdLibrary {
             bind: Vec::new(),
             references: Vec::new(),
             ticks_per_second,
+            events: Vec::new(),
             joints: match skeleton.names() {
                 [] => None,
                 names => Some(Joints::named(names)),
@@ -212,6 +216,7 @@ impl CrowdLibrary {
             bind: self.bind.clone(),
             references: Vec::new(),
             ticks_per_second: self.ticks_per_second,
+            events: Vec::new(),
             joints: self.joints.clone(),
         }
     }

@@ -11,6 +11,7 @@
 //! * [`Crowd`]: instances with up to four [`CrowdLayer`]s each, and the clock.
 //!   [`Engine::crowd`](crate::Engine::crowd) makes one.
 //! * [`CrowdFade`]: a layer's weight as a function of the clock.
+//! * [`ClipEvent`]: a named moment of a clip; [`Crowd::passed_events`] lists those that instances pass.
 //! * [`CrowdOutput`]: which values an evaluation stores for each joint ([`CrowdValues`]), in 32 or 16 bits.
 //! * [`MotionTables`] and [`MotionStates`]: clips without instances, for the training of models of motion.
 //!   [`MotionBuilder`] collects them. With the feature `vulkan`, a `DeviceMotions` has them on a device.
@@ -46,6 +47,7 @@ pub(crate) mod clip_keys;
 pub(crate) mod clip_tables;
 #[cfg(feature = "vulkan")]
 pub(crate) mod device_motions;
+pub(crate) mod events;
 pub(crate) mod fade;
 pub(crate) mod instances;
 pub(crate) mod lay_over;
@@ -59,6 +61,7 @@ pub(crate) mod states;
 pub use crate::crowd::clip_keys::KeyPrecision;
 #[cfg(feature = "vulkan")]
 pub use crate::crowd::device_motions::DeviceMotions;
+pub use crate::crowd::events::{ClipEvent, PassedEvent};
 pub use crate::crowd::fade::CrowdFade;
 pub use crate::crowd::layer::{CrowdLayer, LayerBlend};
 pub use crate::crowd::library::{CrowdLibrary, MotionBuilder, MotionClip};
