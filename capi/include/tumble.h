@@ -142,7 +142,7 @@ typedef uint32_t TumbleLayout;
  Which sign of each key is used: `q` and `-q` are the same rotation. The method "gltf-cubic" ignores
  this option in tracks with tangents, whose keys keep their signs.
  */
-enum TumblePath
+enum TumbleKeySigns
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
   : uint32_t
 #endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -150,18 +150,18 @@ enum TumblePath
   /*
    Each key has the sign that is nearer to the key before it, so rotations between keys are at most 180°.
    */
-  TUMBLE_PATH_SHORTEST = 0,
+  TUMBLE_KEY_SIGNS_SHORTEST = 0,
   /*
    Keys keep their signs. Where the dot product of neighbouring keys is negative, the rotation between them is
    more than 180°.
    */
-  TUMBLE_PATH_AS_AUTHORED = 1,
+  TUMBLE_KEY_SIGNS_AS_AUTHORED = 1,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L
-typedef enum TumblePath TumblePath;
+typedef enum TumbleKeySigns TumbleKeySigns;
 #else
-typedef uint32_t TumblePath;
+typedef uint32_t TumbleKeySigns;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 
@@ -608,9 +608,9 @@ typedef struct TumbleInterpolation {
    */
   const char *method;
   /*
-   A `TumblePath`.
+   A `TumbleKeySigns`.
    */
-  uint32_t path;
+  uint32_t signs;
   /*
    A `TumbleEnds`.
    */

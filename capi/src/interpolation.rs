@@ -16,7 +16,7 @@ use crate::result::Failure;
 /// this option in tracks with tangents, whose keys keep their signs.
 #[repr(u32)]
 #[derive(Debug, Clone, Copy)]
-pub enum TumblePath {
+pub enum TumbleKeySigns {
     /// Each key has the sign that is nearer to the key before it, so rotations between keys are at most 180°.
     Shortest = 0,
     /// Keys keep their signs. Where the dot product of neighbouring keys is negative, the rotation between them is
@@ -93,8 +93,8 @@ pub struct TumbleInterpolation {
     pub size: usize,
     /// The name of the method, such as "slerp", from `tumble_method_name`; null: "bessel-overhauser".
     pub method: *const c_char,
-    /// A `TumblePath`.
-    pub path: u32,
+    /// A `TumbleKeySigns`.
+    pub signs: u32,
     /// A `TumbleEnds`.
     pub ends: u32,
     /// A `TumbleQuantity`.
@@ -162,7 +162,7 @@ impl TumbleInterpolation {
     }
 
     fn with(&self, method: Method) -> Result<Interpolation, Failure> {
-        let path = option(self.path, &KeySigns::ALL, "interpolation->path")?;
+        let signs = option(self.signs, &KeySigns::ALL, "interpolation->signs")?;
         let clamped = Ends::Clamped {
             start: DVec3::from_array(self.start_velocity),
             end: DVec3::from_array(self.end_velocity),
@@ -173,7 +173,7 @@ impl TumbleInterpolation {
         });
         let ends = [&[method.ends], &named[..]].concat();
         let options = InterpolationOptions::default()
-            .with_signs(Some(path))
+            .with_signs(Some(signs))
             .with_ends(Some(option(self.ends, &ends, "interpolation->ends")?))
             .with_tcb(Tcb {
                 tension: self.tension,

@@ -47,7 +47,7 @@ fn constants_count_the_options_of_the_engine() {
 
     use TumbleQuantity as Q;
     same(
-        &[TumblePath::Shortest, TumblePath::AsAuthored],
+        &[TumbleKeySigns::Shortest, TumbleKeySigns::AsAuthored],
         &KeySigns::ALL,
     );
     same(&[TumbleSpeed::AsKeyed, TumbleSpeed::Constant], &Speed::ALL);
@@ -155,7 +155,7 @@ fn defaults() -> TumbleInterpolation {
     TumbleInterpolation {
         size: size_of::<TumbleInterpolation>(),
         method: null(),
-        path: 0,
+        signs: 0,
         ends: 0,
         quantity: 0,
         speed: 0,
@@ -338,7 +338,7 @@ fn constants_names_and_versions_are_checked() {
     let (how, samples) = (defaults(), at_60_fps());
     let argument = TumbleResult::InvalidArgument;
     for (wrong, says) in [
-        (TumbleInterpolation { path: 2, ..how }, "path` is 2"),
+        (TumbleInterpolation { signs: 2, ..how }, "signs` is 2"),
         (TumbleInterpolation { ends: 7, ..how }, "ends` is 7"),
         (TumbleInterpolation { quantity: 5, ..how }, "quantity` is 5"),
         (TumbleInterpolation { speed: 2, ..how }, "speed` is 2"),

@@ -96,7 +96,8 @@ function packedTrack(track, index, before) {
   const what = (name) => `track ${index}${track.name ? ` (${track.name})` : ""}: ${name}`;
   const known = ["name", "times", "rotations", "translations", "scales", "parent", "rest", "interpolation", "tangents"];
   for (const name of Object.keys(track)) {
-    if (!known.includes(name)) throw new TumbleError(`${what(`there is no \`${name}\``)}; there are ${known.join(", ")}`);
+    // `path` is the name that `signs` had before.
+    if (!known.includes(name) && name !== "path") throw new TumbleError(`${what(`there is no \`${name}\``)}; there are ${known.join(", ")}`);
   }
   const times = numbers(track.times ?? [0], Float64Array, 1, what("times"));
   const rotations = numbers(track.rotations ?? [0, 0, 0, 1], Float32Array, 4, what("rotations"));
@@ -174,14 +175,15 @@ function packed(tracks, { name = null, isWorld = false } = {}) {
   return bytes;
 }
 
-const CURVE_OPTIONS = ["method", "ends", "path", "speed", "before", "after", "tension", "continuity", "bias"];
+const CURVE_OPTIONS = ["method", "ends", "signs", "speed", "before", "after", "tension", "continuity", "bias"];
 const OPTIONS = [...CURVE_OPTIONS, "layout", "axes"];
 
 /** The header of a call for a quantity with these options, of which there are those in a list. */
 function headerOf(quantity, options, known) {
   const header = { quantity };
   for (const [name, value] of Object.entries(options)) {
-    if (!known.includes(name)) throw new TumbleError(`there is no option \`${name}\`; there are ${known.join(", ")}`);
+    // `path` is the name that `signs` had before.
+    if (!known.includes(name) && name !== "path") throw new TumbleError(`there is no option \`${name}\`; there are ${known.join(", ")}`);
     // Digits are kept as text: JSON's readers may round a number in its last place.
     if (value !== undefined) header[name] = typeof value === "number" ? String(value) : value;
   }

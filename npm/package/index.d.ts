@@ -14,7 +14,7 @@ export interface CurveOptions {
   /** The boundary condition at the first and the last key. Default: depends on the method. */
   ends?: "parabolic" | "natural" | "clamped" | "secant" | "loop" | "frozen";
   /** Which way to rotate between neighbouring keys. Default: `shortest`. */
-  path?: "shortest" | "as-authored";
+  signs?: "shortest" | "as-authored";
   /** The speed along the curve. Default: `as-keyed`. */
   speed?: "as-keyed" | "constant";
   /** The values before the first key. Default: `hold`. */

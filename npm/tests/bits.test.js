@@ -50,7 +50,7 @@ test("options mean what they mean to the program", () => {
     [{ ends: "natural" }, "--ends", "natural"],
     [{ ends: "clamped", after: "extrapolate" }, "--ends", "clamped", "--after", "extrapolate"],
     [{ before: "loop", after: "mirror" }, "--before", "loop", "--after", "mirror"],
-    [{ path: "as-authored" }, "--signs", "as-authored"],
+    [{ signs: "as-authored" }, "--signs", "as-authored"],
     [{ speed: "constant" }, "--speed", "constant"],
     [{ method: "kochanek-bartels", tension: 0.1, continuity: 0.3, bias: -0.7 }, "--tension", "0.1", "--continuity", "0.3", "--bias", "-0.7"],
     [{ layout: "frame" }, "--layout", "frame"],

@@ -136,7 +136,7 @@ macro_rules! number {
 impl InterpolationOption {
     /// Every option but the quantity, in the order of lists in help and signatures.
     pub const ALL: [Self; 8] = [
-        named!("path", signs, |signs| Some(signs), |options| {
+        named!("signs", signs, |signs| Some(signs), |options| {
             options.signs.map(|signs| signs.to_string())
         }),
         named!("ends", ends, |ends| Some(ends), |options| {
@@ -156,9 +156,10 @@ impl InterpolationOption {
         number!("bias", bias),
     ];
 
-    /// The option of this name.
+    /// The option of this name. `path` is the name that `signs` had before.
     #[must_use]
     pub fn named(name: &str) -> Option<Self> {
+        let name = if name == "path" { "signs" } else { name };
         Self::ALL.into_iter().find(|option| option.name == name)
     }
 
