@@ -104,7 +104,7 @@ impl Row<'_> {
                     (start, count) = (start + 1, count - 1);
                     distance += 1.0;
                 }
-                match source {
+                match source.source() {
                     SpanSource::Segment(index) => {
                         let affine = block.affine(j);
                         let segment = &segments[index as usize];
