@@ -6,10 +6,11 @@
 use std::ops::Range;
 
 use crate::cpu::evaluate::SAMPLES_ONE_BY_ONE;
+use crate::cpu::segment_list::SegmentList;
 use crate::from_keys::KeyCurve;
 use crate::from_keys::intervals::{IntervalPlan, MIN_LANES, evaluate_intervals};
 use crate::prepare::clip_data::{ClipData, PartRef};
-use crate::shader::{Form, PolynomialSegment};
+use crate::shader::Form;
 use crate::simd::dispatch::{InLanesInto, VectorWidth, in_lanes_into};
 use crate::simd::lanes::Lanes;
 use crate::time::frame_clock::FrameClock;
@@ -17,7 +18,6 @@ use crate::time::frames::{Ticks, Timeline};
 use crate::time::key_samples::FramePlan;
 use crate::time::runs::NONE;
 use crate::time::spans::{SpanSource, StoredSource};
-use crate::twin::Evaluate as _;
 
 /// The mean number of samples of an arc from which its run is evaluated in vectors of its own.
 const SAMPLES_OF_AN_ARC: usize = 8;
@@ -101,7 +101,10 @@ impl<'a> ShortRuns<'a> {
                     plan: &self.plan,
                     sources: &prepared.spans.sources[part.spans.clone()],
                 };
-                in_lanes_into(self.width, &work, &segments.polynomials[..], output);
+                match segments.packed() {
+                    Some(packed) => in_lanes_into(self.width, &work, packed, output),
+                    None => in_lanes_into(self.width, &work, &segments.polynomials[..], output),
+                }
             }
         }
         true
@@ -115,21 +118,18 @@ struct Polynomials<'a> {
     sources: &'a [StoredSource],
 }
 
-impl InLanesInto<[PolynomialSegment], [[f32; 4]]> for Polynomials<'_> {
+impl<I: SegmentList + ?Sized> InLanesInto<I, [[f32; 4]]> for Polynomials<'_> {
     type Outcome = ();
 
     #[inline(always)]
-    fn run<L: Lanes>(&self, segments: &[PolynomialSegment], output: &mut [[f32; 4]]) {
+    fn run<L: Lanes>(&self, segments: &I, output: &mut [[f32; 4]]) {
         for lanes in self.plan.vectors() {
             for (lane, (interval, samples)) in lanes.intervals().enumerate() {
                 let SpanSource::Segment(index) = self.sources[interval].source() else {
                     continue; // regular parts have segments alone
                 };
-                let segment = &segments[index as usize];
                 let parameters = self.plan.parameters_of(lanes, lane);
-                for (value, parameter) in output[samples].iter_mut().zip(parameters) {
-                    *value = segment.value_at(parameter);
-                }
+                segments.values_at(index, parameters, &mut output[samples]);
             }
         }
     }

@@ -23,7 +23,6 @@ use crate::time::spans::{SpanSource, StoredSource};
 use crate::time::times::interval_at;
 use crate::tracks::set::TrackSet;
 use crate::tracks::track_keys::TrackKeys;
-use crate::twin::Evaluate as _;
 use crate::twin::arc_between::arc_between;
 use crate::twin::evaluate_arc::{norm_squared, on_arc};
 use crate::twin::small_angle::small_angle_cubic;
@@ -295,7 +294,7 @@ impl Rest {
         match spans.source(first + span) {
             SpanSource::Segment(index) => {
                 let parameter = in_seconds(end - start).parameter(at.time - start);
-                segments.polynomials[index as usize].value_at(parameter)
+                segments.polynomial_at(index, parameter)
             }
             SpanSource::Exact(index) => {
                 let length = end - start;

@@ -57,6 +57,11 @@ pub(crate) enum MachineKind {
 }
 
 impl Limits {
+    /// Whether clips keep packed segments: kernels of devices, and the small engine of a page, do not read them.
+    pub(crate) fn packs_segments(&self) -> bool {
+        !cfg!(smallest) && matches!(self.kind, MachineKind::Cpu { .. })
+    }
+
     /// Whether a device prepares the arcs between so many keys.
     pub(crate) fn prepares_arcs(&self, keys: usize) -> bool {
         self.prepares_arcs_from.is_some_and(|from| keys >= from)

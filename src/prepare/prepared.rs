@@ -3,7 +3,7 @@
 use std::collections::TryReserveError;
 use std::ops::Range;
 
-use bytemuck::Zeroable;
+use bytemuck::{TransparentWrapper as _, Zeroable};
 
 use crate::fit::block::LANES;
 use crate::fit::exact::cut::Cutter;
@@ -11,6 +11,7 @@ use crate::fit::exact::fit::IntervalCurve;
 use crate::math::quaternion::round_quat;
 use crate::memory::OutOfMemoryError;
 use crate::method::interpolation::Interpolation;
+use crate::prepare::packed::PackedSegments;
 use crate::shader::{ArcSegment, Form, PolynomialSegment};
 use crate::time::frames::{Ticks, Timeline};
 use crate::time::runs::{NONE, Parameter};
@@ -20,6 +21,7 @@ use crate::time::spans::{
 use crate::time::wrap::Wrap;
 use crate::tracks::error::LATEST;
 use crate::tracks::signs::SignBits;
+use crate::twin::Evaluate as _;
 
 /// Segments of some tracks, with the tables by which the segment of a sample is found.
 pub(crate) struct Prepared {
@@ -104,6 +106,7 @@ impl Prepared {
             arcs,
             intervals,
             polynomials,
+            packed,
             ..
         } = &self.segments;
         let Spans {
@@ -115,6 +118,7 @@ impl Prepared {
         size_of_val(&arcs[..])
             + size_of_val(&intervals[..])
             + size_of_val(&polynomials[..])
+            + size_of_val(&packed[..])
             + size_of_val(&self.constants[..])
             + size_of_val(&self.exact[..])
             + size_of_val(&starts[..])
@@ -128,13 +132,14 @@ impl Prepared {
         self.segments.arcs.clear();
         self.segments.intervals.clear();
         self.segments.polynomials.clear();
+        self.segments.packed.clear();
         self.constants.clear();
         self.exact.clear();
         self.spans.clear();
         self.parts.clear();
     }
 
-    /// Merges all groups into the first, with memory reserved for all at once; `None` if there are no groups.
+    /// Merges all groups, of which none is packed, into the first, with memory reserved for all at once; `None` if there are no groups.
     pub(crate) fn together(groups: Vec<Self>) -> Option<Self> {
         let total = |count: fn(&Self) -> usize| groups.iter().skip(1).map(count).sum();
         let [segments, constants, exact, spans, parts]: [usize; 5] = [
@@ -371,7 +376,7 @@ impl Prepared {
     }
 }
 
-/// The segments of one clip, all of one form and in one list: the others stay empty.
+/// The segments of one group, all of one form and in one list: the others stay empty.
 #[derive(Debug, Clone)]
 pub(crate) struct Segments {
     pub(crate) form: Form,
@@ -382,6 +387,8 @@ pub(crate) struct Segments {
     /// [`START_NEGATED`](crate::shader::START_NEGATED) and [`END_NEGATED`](crate::shader::END_NEGATED).
     pub(crate) intervals: Vec<u32>,
     pub(crate) polynomials: Vec<PolynomialSegment>,
+    /// The rows of polynomials that are packed ([`Prepared::pack`]).
+    pub(crate) packed: Vec<[f32; 4]>,
 }
 
 impl Segments {
@@ -392,11 +399,29 @@ impl Segments {
             arcs: Vec::new(),
             intervals: Vec::new(),
             polynomials: Vec::new(),
+            packed: Vec::new(),
         }
     }
 
+    /// The number of segments that are not packed.
     pub(crate) fn len(&self) -> usize {
         self.arcs.len() + self.intervals.len() + self.polynomials.len()
+    }
+
+    /// The polynomials, if they are packed; clips in pages of `tumble view` never are.
+    #[inline(always)]
+    pub(crate) fn packed(&self) -> Option<&PackedSegments> {
+        let is_packed = !cfg!(smallest) && !self.packed.is_empty();
+        is_packed.then(|| PackedSegments::wrap_ref(&self.packed))
+    }
+
+    /// The value of a polynomial at a parameter.
+    #[inline(always)]
+    pub(crate) fn polynomial_at(&self, index: u32, parameter: f32) -> [f32; 4] {
+        match self.packed() {
+            Some(packed) => packed.value_at(index, parameter),
+            None => self.polynomials[index as usize].value_at(parameter),
+        }
     }
 
     pub(crate) fn reserve(&mut self, count: usize) {

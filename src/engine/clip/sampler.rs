@@ -431,7 +431,7 @@ impl SampledClip {
         match source_at(prepared, part, cursor, time) {
             SpanSource::Segment(index) => {
                 let parameter = cursor.in_seconds.parameter(time - cursor.start);
-                group.at_parameter(index as usize, parameter)
+                group.at_parameter(index, parameter)
             }
             SpanSource::Constant(index) => prepared.constants[index as usize],
             SpanSource::Exact(index) => cursor.exact(prepared, index, time),
@@ -530,7 +530,7 @@ impl SampledClip {
                 let distance = distance.at_sample(0, || time);
                 let parameter = distance * affine.scale + affine.offset;
                 match &self.groups[group] {
-                    SampledGroup::Prepared(group) => group.at_parameter(index as usize, parameter),
+                    SampledGroup::Prepared(group) => group.at_parameter(index, parameter),
                     SampledGroup::Keys(_) => [0.0; 4],
                 }
             }
@@ -599,7 +599,7 @@ impl TracksAtCursor<'_> {
         let parameter = cursor.in_seconds.parameter(time - cursor.start);
         for (part, value) in parts.iter().zip(output) {
             *value = match source_at(prepared, part, cursor, time) {
-                SpanSource::Segment(index) => group.at_parameter(index as usize, parameter),
+                SpanSource::Segment(index) => group.at_parameter(index, parameter),
                 SpanSource::Constant(index) => prepared.constants[index as usize],
                 SpanSource::Exact(index) => cursor.exact(prepared, index, time),
             };
@@ -683,11 +683,11 @@ impl PreparedGroup {
 
     /// The value of a segment at a parameter.
     #[inline(always)]
-    fn at_parameter(&self, index: usize, parameter: f32) -> [f32; 4] {
+    fn at_parameter(&self, index: u32, parameter: f32) -> [f32; 4] {
         let segments = &self.prepared().segments;
         match segments.form {
-            Form::Polynomial => segments.polynomials[index].value_at(parameter),
-            Form::Arc => self.arcs()[index].value_at(parameter),
+            Form::Polynomial => segments.polynomial_at(index, parameter),
+            Form::Arc => self.arcs()[index as usize].value_at(parameter),
         }
     }
 
