@@ -4,9 +4,8 @@
 
 use bytemuck::TransparentWrapper;
 
-use crate::prepare::prepared::Prepared;
 use crate::shader::{POWERS, PolynomialSegment};
-use crate::time::spans::{SOURCE_INDEX, SpanSource};
+use crate::time::spans::{SOURCE_INDEX, SpanSource, StoredSource};
 use crate::twin::Evaluate as _;
 use crate::twin::evaluate_polynomial::Polynomial;
 
@@ -91,38 +90,40 @@ impl PackedSegments {
     }
 }
 
-impl Prepared {
-    /// Packs its polynomials, which are all fitted and divided. Segments that are so many that an index has no room for
-    /// their rows, and those for which there is no memory to pack them, stay as they are.
-    pub(crate) fn pack(&mut self) {
-        let polynomials = &mut self.segments.polynomials;
-        let mut indices: Vec<PackedIndex> = Vec::new();
-        if polynomials.len() > PackedIndex::ROW as usize / POWERS
-            || indices.try_reserve_exact(polynomials.len()).is_err()
-        {
-            return;
-        }
-        let mut end = 0;
-        for segment in &*polynomials {
-            let index = PackedIndex::new(end as u32, segment);
-            indices.push(index);
-            end += index.row_count();
-        }
-        // In the same memory: no segment moves to a row behind its own.
-        let mut rows: Vec<[f32; 4]> = bytemuck::cast_vec(std::mem::take(polynomials));
-        for (index, first) in indices.iter().zip((0..).step_by(POWERS)) {
-            rows.copy_within(first..first + index.row_count(), index.row());
-        }
-        rows.truncate(end);
-        rows.shrink_to_fit();
-        self.segments.packed = rows;
-        for stored in &mut self.spans.sources {
-            if let SpanSource::Segment(index) = stored.source() {
-                let PackedIndex(packed) = indices[index as usize];
-                *stored = SpanSource::Segment(packed).into();
-            }
+/// Packs polynomials, which are all fitted and divided, and changes the indices in the sources of their spans; returns the
+/// rows. Polynomials that are so many that an index has no room for their rows, and those for which there is no memory to
+/// pack them, stay as they are.
+pub(crate) fn pack(
+    polynomials: &mut Vec<PolynomialSegment>,
+    sources: &mut [StoredSource],
+) -> Vec<[f32; 4]> {
+    let mut indices: Vec<PackedIndex> = Vec::new();
+    if polynomials.is_empty()
+        || polynomials.len() > PackedIndex::ROW as usize / POWERS
+        || indices.try_reserve_exact(polynomials.len()).is_err()
+    {
+        return Vec::new();
+    }
+    let mut end = 0;
+    for segment in &*polynomials {
+        let index = PackedIndex::new(end as u32, segment);
+        indices.push(index);
+        end += index.row_count();
+    }
+    // In the same memory: no segment moves to a row behind its own.
+    let mut rows: Vec<[f32; 4]> = bytemuck::cast_vec(std::mem::take(polynomials));
+    for (index, first) in indices.iter().zip((0..).step_by(POWERS)) {
+        rows.copy_within(first..first + index.row_count(), index.row());
+    }
+    rows.truncate(end);
+    rows.shrink_to_fit();
+    for stored in sources {
+        if let SpanSource::Segment(index) = stored.source() {
+            let PackedIndex(packed) = indices[index as usize];
+            *stored = SpanSource::Segment(packed).into();
         }
     }
+    rows
 }
 
 #[cfg(test)]
@@ -137,6 +138,7 @@ mod tests {
     use crate::output::rotations::Layout;
     use crate::output::window::Window;
     use crate::prepare::clip_data::{ClipData, PrepareRequest};
+    use crate::prepare::prepared::Prepared;
     use crate::simd::dispatch::VectorWidth;
     use crate::time::frames::SampleTimes;
     use crate::time::runs::NONE;

@@ -11,7 +11,7 @@ use crate::fit::exact::fit::IntervalCurve;
 use crate::math::quaternion::round_quat;
 use crate::memory::OutOfMemoryError;
 use crate::method::interpolation::Interpolation;
-use crate::prepare::packed::PackedSegments;
+use crate::prepare::packed::{PackedSegments, pack};
 use crate::shader::{ArcSegment, Form, PolynomialSegment};
 use crate::time::frames::{Ticks, Timeline};
 use crate::time::runs::{NONE, Parameter};
@@ -98,6 +98,16 @@ impl Prepared {
         self.spans.sources.shrink_to_fit();
         self.segments.polynomials.shrink_to_fit();
         self.exact.shrink_to_fit();
+    }
+
+    /// Packs its polynomials, if it has any.
+    pub(crate) fn pack(&mut self) {
+        let Segments {
+            polynomials,
+            packed,
+            ..
+        } = &mut self.segments;
+        *packed = pack(polynomials, &mut self.spans.sources);
     }
 
     /// Bytes of its lists.
