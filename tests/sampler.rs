@@ -1,10 +1,10 @@
 //! `Clip::sampler`: single samples and poses, with the bits of `evaluate` at the same times.
 
-use glam::{DQuat, Quat, Vec4};
+use glam::{DQuat, DVec3, Quat, Vec4};
 use tumble::vulkan::tuning::PrepareArcs;
 use tumble::{
     Axes, Clip, Device, Ends, Engine, EngineOptions, Error, Interpolation, KeySigns, Layout,
-    METHODS, Quantity, SampleTimes, Speed, TrackSet, WrapMode, method,
+    METHODS, Quantity, SampleTimes, Speed, TrackSet, VectorWidth, WrapMode, method,
 };
 
 use crate::support::{Random, first_difference, hostile_set, vulkan_engines};
@@ -80,6 +80,66 @@ fn samples_have_the_bits_of_evaluate() {
     let constant = Interpolation::from(method::C2).with_speed(Speed::Constant);
     let clip = cpu().upload(&set, constant).unwrap();
     assert_sampled(&clip, &times, "constant speed");
+}
+
+/// Clips keep packed segments; sets are evaluated from whole ones, or from keys.
+#[test]
+fn packed_segments_have_the_bits_of_whole_ones() {
+    let set = motion_set(31);
+    let mut sampled = times(&set, &mut Random(32));
+    sampled.truncate(600);
+    let frames = [24, 60, 480].map(SampleTimes::fps);
+    let velocity = Interpolation::from(method::BESSEL_OVERHAUSER)
+        .with_quantity(Quantity::Velocity(Axes::Body));
+    for width in VectorWidth::available() {
+        let mut options = EngineOptions::default();
+        options.vector_width = Some(width);
+        let engine = Engine::with_options(Device::Cpu, &options).unwrap();
+        for interpolation in [
+            method::BESSEL_OVERHAUSER.into(),
+            method::C2.into(),
+            velocity,
+        ] {
+            let clip = engine.upload(&set, interpolation).unwrap();
+            for frames in frames.iter().chain([&SampleTimes::at(sampled.clone())]) {
+                for layout in Layout::ALL {
+                    let [expected, found] = [
+                        engine.request(&set, interpolation, frames),
+                        clip.request(frames),
+                    ]
+                    .map(|request| request.layout(layout).evaluate_bytes().unwrap());
+                    let label =
+                        format!("{width:?}, {}, {frames:?}, {layout}", interpolation.method);
+                    assert!(expected == found, "{label}");
+                }
+            }
+        }
+        let clip = engine.upload(&set, method::BESSEL_OVERHAUSER).unwrap();
+        assert_sampled(&clip, &sampled, "packed");
+    }
+}
+
+/// `Clip::bytes_per_key` of polynomials: 144 for small angles, 208 for large ones.
+#[test]
+fn polynomials_of_small_angles_take_less_memory() {
+    let times: Vec<f64> = (0..1000).map(|key| f64::from(key) / 30.0).collect();
+    let bytes_of = |degrees: f64| {
+        let step = DQuat::from_axis_angle(DVec3::new(0.48, 0.6, 0.64), degrees.to_radians());
+        let mut rotation = Random(33).rotation();
+        let mut set = TrackSet::new();
+        let keys: Vec<Quat> = (times.iter())
+            .map(|_| {
+                rotation = (rotation * step).normalize();
+                rotation.as_quat()
+            })
+            .collect();
+        set.push("", &times, &keys).unwrap();
+        let clip = cpu().upload(&set, method::BESSEL_OVERHAUSER).unwrap();
+        clip.bytes_per_key()
+    };
+    let (small, large) = (bytes_of(2.0), bytes_of(60.0));
+    assert!((143.0..145.0).contains(&small), "{small}");
+    assert!((207.0..209.0).contains(&large), "{large}");
 }
 
 /// Arcs of more than half a turn, which are divided: tracks with the same key times have different spans.
@@ -260,7 +320,7 @@ fn kept_keys_have_the_bits_of_segments() {
     for (set, method) in [(&set, method::SQUAD), (&hostile, method::BESSEL_OVERHAUSER)] {
         let clip = of_keys.upload(set, method).unwrap();
         assert!(
-            clip.bytes_per_key() > 150.0,
+            clip.bytes_per_key() > 100.0,
             "{method}: {}",
             clip.bytes_per_key()
         );

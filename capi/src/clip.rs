@@ -148,8 +148,8 @@ pub unsafe extern "C" fn tumble_upload(
 }
 
 /// Returns the memory that a clip takes on the host for each key, bytes: 16 and more of a clip that keeps its keys,
-/// 68 or 212 and more of one that keeps segments. On the CPU, large clips whose samples can be computed from their keys
-/// keep these.
+/// 64, or 144 to 208, and more of one that keeps segments. On the CPU, large clips whose samples can be computed from
+/// their keys keep these.
 ///
 /// # Safety
 /// `bytes` must point to memory for a number.

@@ -6,7 +6,7 @@ use std::slice;
 
 use crate::shader::ArcSegment;
 use crate::simd::cache_line::CacheLine;
-use crate::simd::lanes::{Lanes, MAX_LANES, Number as _};
+use crate::simd::lanes::{Lanes, MAX_LANES};
 use crate::time::runs::Affine;
 use crate::twin::{Evaluate, Parameters, WHOLE_DEGREE};
 
@@ -106,13 +106,7 @@ pub(crate) fn distances<L: Lanes, S: Evaluate>(
 /// Evaluates the sample at a distance from the segment's middle.
 #[inline(always)]
 pub(crate) fn one<S: Evaluate>(segment: &S, affine: Affine, distance: f32) -> [f32; 4] {
-    at_parameter(segment, distance * affine.scale + affine.offset)
-}
-
-/// Evaluates the sample at a parameter of the segment.
-#[inline(always)]
-pub(crate) fn at_parameter<S: Evaluate>(segment: &S, parameter: f32) -> [f32; 4] {
-    segment.at(parameter).canonical().to_array()
+    segment.value_at(distance * affine.scale + affine.offset)
 }
 
 /// The distances of a run's samples from the segment's middle, a vector at a time.
@@ -188,7 +182,9 @@ fn run<L: Lanes, S: Evaluate, O: Sink>(
 ) {
     let iterations = count.div_ceil(S::samples::<L>());
     let prefetches = matches!(S::PIPELINE_FROM, Some(from) if iterations >= from);
-    if cfg!(smallest) || !segment.is_canonical() {
+    if S::IS_SHORT {
+        vectors::<L, S, O, false, false, WHOLE_DEGREE>(segment, affine, count, distances, output);
+    } else if cfg!(smallest) || !segment.is_canonical() {
         vectors::<L, S, O, true, false, WHOLE_DEGREE>(segment, affine, count, distances, output);
     } else if prefetches {
         vectors::<L, S, O, false, true, WHOLE_DEGREE>(segment, affine, count, distances, output);

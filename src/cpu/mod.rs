@@ -49,5 +49,6 @@ pub(crate) mod engine;
 pub(crate) mod evaluate;
 pub(crate) mod row;
 pub(crate) mod scratch;
+pub(crate) mod segment_list;
 pub(crate) mod short_runs;
 pub(crate) mod streaming;

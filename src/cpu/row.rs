@@ -3,7 +3,8 @@
 use bytemuck::Zeroable as _;
 use glam::Vec4;
 
-use crate::cpu::evaluate::{SAMPLES_ONE_BY_ONE, distances, frames};
+use crate::cpu::evaluate::SAMPLES_ONE_BY_ONE;
+use crate::cpu::segment_list::SegmentList;
 use crate::cpu::streaming::{RowOutput, Samples};
 use crate::prepare::clip_data::PartRef;
 use crate::simd::dispatch::{InLanesInto, VectorWidth, in_lanes_into};
@@ -15,7 +16,6 @@ use crate::time::runs::{
     Distance, Emit, IntervalBlock, IntervalBlocks, NONE, Parameter, Run, RunSource,
 };
 use crate::time::spans::SpanSource;
-use crate::twin::Evaluate;
 
 /// The number of samples whose distances are computed together.
 const CHUNK: usize = 64;
@@ -30,9 +30,9 @@ pub(crate) struct Row<'a> {
 
 impl Row<'_> {
     /// Evaluates the samples into `output`, which starts at the first sample of the track copy.
-    pub(crate) fn evaluate<S: Evaluate>(
+    pub(crate) fn evaluate<I: SegmentList + ?Sized>(
         &self,
-        segments: &[S],
+        segments: &I,
         output: &mut RowOutput<'_, '_>,
     ) -> Result<(), SampleTimesError> {
         match output {
@@ -43,11 +43,11 @@ impl Row<'_> {
     }
 }
 
-impl<S: Evaluate, O: Samples + ?Sized> InLanesInto<[S], O> for Row<'_> {
+impl<I: SegmentList + ?Sized, O: Samples + ?Sized> InLanesInto<I, O> for Row<'_> {
     type Outcome = Result<(), SampleTimesError>;
 
     #[inline(always)]
-    fn run<L: Lanes>(&self, segments: &[S], output: &mut O) -> Result<(), SampleTimesError> {
+    fn run<L: Lanes>(&self, segments: &I, output: &mut O) -> Result<(), SampleTimesError> {
         let PartRef { prepared, part } = self.part;
         if self.copy.samples.len() <= SAMPLES_ONE_BY_ONE {
             return self.one_by_one(segments, output.samples());
@@ -55,7 +55,7 @@ impl<S: Evaluate, O: Samples + ?Sized> InLanesInto<[S], O> for Row<'_> {
         if let (&Ticks::Frames { rate, start }, true) = (&self.timeline.ticks, self.copy.is_track())
         {
             let clock = FrameClock::new(rate, start, prepared.spans.steps);
-            if self.spans::<L, S, O>(clock, segments, output) {
+            if self.spans::<L, I, O>(clock, segments, output) {
                 let runs = (prepared.spans).runs_outside(part, clock, &self.copy.samples);
                 let mut outside = OneByOne {
                     row: self,
@@ -75,10 +75,10 @@ impl Row<'_> {
     /// nearly every sample is evaluated so. Returns false if a distance from a segment's middle is not an integer
     /// that f32 has; then the caller evaluates all samples by runs.
     #[inline(always)]
-    fn spans<L: Lanes, S: Evaluate, O: Samples + ?Sized>(
+    fn spans<L: Lanes, I: SegmentList + ?Sized, O: Samples + ?Sized>(
         &self,
         clock: FrameClock,
-        segments: &[S],
+        segments: &I,
         output: &mut O,
     ) -> bool {
         let PartRef { prepared, part } = self.part;
@@ -104,11 +104,10 @@ impl Row<'_> {
                     (start, count) = (start + 1, count - 1);
                     distance += 1.0;
                 }
-                match source {
+                match source.source() {
                     SpanSource::Segment(index) => {
                         let affine = block.affine(j);
-                        let segment = &segments[index as usize];
-                        output.frames::<L, S>(segment, affine, distance, start, count);
+                        segments.frames::<L, O>(index, affine, distance, start, count, output);
                     }
                     SpanSource::Constant(index) => {
                         let constant = prepared.constants[index as usize];
@@ -129,9 +128,9 @@ impl Row<'_> {
 
     /// Evaluates at most [`SAMPLES_ONE_BY_ONE`] samples, one by one.
     #[inline(never)]
-    fn one_by_one<S: Evaluate>(
+    fn one_by_one<I: SegmentList + ?Sized>(
         &self,
-        segments: &[S],
+        segments: &I,
         output: &mut [[f32; 4]],
     ) -> Result<(), SampleTimesError> {
         let PartRef { prepared, part } = self.part;
@@ -146,9 +145,9 @@ impl Row<'_> {
     /// Evaluates all samples by a list of their runs. This is a separate function to keep the usual path small, and
     /// to compile the search for runs only once instead of for each vector width.
     #[inline(never)]
-    fn runs<S: Evaluate>(
+    fn runs<I: SegmentList + ?Sized>(
         &self,
-        segments: &[S],
+        segments: &I,
         output: &mut [[f32; 4]],
     ) -> Result<(), SampleTimesError> {
         let PartRef { prepared, part } = self.part;
@@ -160,10 +159,10 @@ impl Row<'_> {
 
     /// Evaluates a run; `output` starts at the first sample of the track copy.
     #[inline(always)]
-    fn evaluate_run<L: Lanes, S: Evaluate>(
+    fn evaluate_run<L: Lanes, I: SegmentList + ?Sized>(
         &self,
         run: &Run,
-        segments: &[S],
+        segments: &I,
         output: &mut [[f32; 4]],
     ) {
         let PartRef { prepared, part } = self.part;
@@ -171,9 +170,8 @@ impl Row<'_> {
         match run.source {
             RunSource::Constant(index) => output.fill(prepared.constants[index as usize]),
             RunSource::Segment(index, distance, affine) => {
-                let segment = &segments[index as usize];
                 if let Distance::Near { first } = distance {
-                    return frames::<L, S>(segment, affine, first, run.count, output);
+                    return segments.frames::<L, _>(index, affine, first, 0, run.count, output);
                 }
                 let mut from_middle = [0.0; CHUNK];
                 for (chunk, output) in output.chunks_mut(CHUNK).enumerate() {
@@ -182,7 +180,7 @@ impl Row<'_> {
                         let time = || self.timeline.time_at(part.track as usize, run.sample + j);
                         *value = distance.at_sample(j, time);
                     }
-                    distances::<L, S>(segment, affine, &from_middle, count, output);
+                    segments.distances::<L>(index, affine, &from_middle, output);
                 }
             }
             RunSource::Exact { index, parameter } => {
@@ -208,28 +206,28 @@ struct RunList<'a, 'r> {
     runs: Vec<Run>,
 }
 
-impl<S: Evaluate> InLanesInto<[S], [[f32; 4]]> for RunList<'_, '_> {
+impl<I: SegmentList + ?Sized> InLanesInto<I, [[f32; 4]]> for RunList<'_, '_> {
     type Outcome = ();
 
     #[inline(always)]
-    fn run<L: Lanes>(&self, segments: &[S], output: &mut [[f32; 4]]) {
+    fn run<L: Lanes>(&self, segments: &I, output: &mut [[f32; 4]]) {
         for run in &self.runs {
-            self.row.evaluate_run::<L, S>(run, segments, output);
+            self.row.evaluate_run::<L, I>(run, segments, output);
         }
     }
 }
 
 /// Evaluates runs as they are found, for few samples, and for samples outside the keys.
-struct OneByOne<'a, 'r, S> {
+struct OneByOne<'a, 'r, I: ?Sized> {
     row: &'a Row<'r>,
-    segments: &'a [S],
+    segments: &'a I,
     output: &'a mut [[f32; 4]],
 }
 
-impl<S: Evaluate> Emit for OneByOne<'_, '_, S> {
+impl<I: SegmentList + ?Sized> Emit for OneByOne<'_, '_, I> {
     // Not inlined, because it has many callers.
     #[inline(never)]
     fn run(&mut self, run: Run) {
-        (self.row).evaluate_run::<Vec4, S>(&run, self.segments, self.output);
+        (self.row).evaluate_run::<Vec4, I>(&run, self.segments, self.output);
     }
 }

@@ -5,17 +5,19 @@
 
 use std::ops::Range;
 
-use crate::cpu::evaluate::{SAMPLES_ONE_BY_ONE, at_parameter};
+use crate::cpu::evaluate::SAMPLES_ONE_BY_ONE;
+use crate::cpu::segment_list::SegmentList;
 use crate::from_keys::KeyCurve;
 use crate::from_keys::intervals::{IntervalPlan, MIN_LANES, evaluate_intervals};
 use crate::prepare::clip_data::{ClipData, PartRef};
-use crate::shader::{Form, PolynomialSegment};
+use crate::shader::Form;
 use crate::simd::dispatch::{InLanesInto, VectorWidth, in_lanes_into};
 use crate::simd::lanes::Lanes;
 use crate::time::frame_clock::FrameClock;
 use crate::time::frames::{Ticks, Timeline};
 use crate::time::key_samples::FramePlan;
 use crate::time::runs::NONE;
+use crate::time::spans::{SpanSource, StoredSource};
 
 /// The mean number of samples of an arc from which its run is evaluated in vectors of its own.
 const SAMPLES_OF_AN_ARC: usize = 8;
@@ -95,9 +97,14 @@ impl<'a> ShortRuns<'a> {
             }
             Form::Polynomial => {
                 self.plan.store_keys(keys, output);
-                let first = prepared.first_segment(part);
-                let segments = &segments.polynomials[first..first + part.spans.len()];
-                in_lanes_into(self.width, &Polynomials(&self.plan), segments, output);
+                let work = Polynomials {
+                    plan: &self.plan,
+                    sources: &prepared.spans.sources[part.spans.clone()],
+                };
+                match segments.packed() {
+                    Some(packed) => in_lanes_into(self.width, &work, packed, output),
+                    None => in_lanes_into(self.width, &work, &segments.polynomials[..], output),
+                }
             }
         }
         true
@@ -105,20 +112,24 @@ impl<'a> ShortRuns<'a> {
 }
 
 /// Evaluates samples of polynomials one by one, all of a segment in succession.
-struct Polynomials<'a>(&'a IntervalPlan);
+struct Polynomials<'a> {
+    plan: &'a IntervalPlan,
+    /// Of each interval.
+    sources: &'a [StoredSource],
+}
 
-impl InLanesInto<[PolynomialSegment], [[f32; 4]]> for Polynomials<'_> {
+impl<I: SegmentList + ?Sized> InLanesInto<I, [[f32; 4]]> for Polynomials<'_> {
     type Outcome = ();
 
     #[inline(always)]
-    fn run<L: Lanes>(&self, segments: &[PolynomialSegment], output: &mut [[f32; 4]]) {
-        for lanes in self.0.vectors() {
+    fn run<L: Lanes>(&self, segments: &I, output: &mut [[f32; 4]]) {
+        for lanes in self.plan.vectors() {
             for (lane, (interval, samples)) in lanes.intervals().enumerate() {
-                let segment = &segments[interval];
-                let parameters = self.0.parameters_of(lanes, lane);
-                for (value, parameter) in output[samples].iter_mut().zip(parameters) {
-                    *value = at_parameter(segment, parameter);
-                }
+                let SpanSource::Segment(index) = self.sources[interval].source() else {
+                    continue; // regular parts have segments alone
+                };
+                let parameters = self.plan.parameters_of(lanes, lane);
+                segments.values_at(index, parameters, &mut output[samples]);
             }
         }
     }

@@ -86,7 +86,7 @@ fn curve(
             let key = prepared.spans.keys[index];
             let is_on_key = key != NONE && from.first == from.frame;
             let key = (key != NONE).then(|| constant(key));
-            match prepared.spans.sources[index] {
+            match prepared.spans.source(index) {
                 SpanSource::Segment(index) => {
                     let along = in_frames(from.frame, to.frame, 1.0);
                     let span = CrowdSpan {

@@ -87,7 +87,11 @@ impl Uploaded {
             return Self::of_set(set.clone(), interpolation);
         }
         refuse_more_than_there_is::<u8>(needed, SEGMENTS)?;
-        let clip = prepare(machine, set, interpolation, PrepareRequest::all(set), None)?;
+        let to_prepare = PrepareRequest {
+            packs: limits.packs_segments(),
+            ..PrepareRequest::all(set)
+        };
+        let clip = prepare(machine, set, interpolation, to_prepare, None)?;
         Ok(Self::Prepared(clip))
     }
 

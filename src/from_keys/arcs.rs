@@ -12,7 +12,7 @@ use crate::simd::lanes::{Lanes, canonical as canonical_rotations};
 use crate::tracks::track_keys::SignedKeys;
 use crate::twin::arc_between::arc_between;
 use crate::twin::evaluate_arc::{norm_squared, on_arc};
-use crate::twin::evaluate_polynomial::polynomial;
+use crate::twin::functions::polynomial;
 
 /// The maximum number of samples that are evaluated together.
 pub(crate) const LANES: usize = 64;

@@ -2,7 +2,6 @@
 //! angles does not hold. A segment takes 176 bytes, and samples at one time read one for each track.
 
 use bytemuck::Zeroable;
-use glam::Vec4;
 
 use crate::curve::options::Ends;
 use crate::fit::tangent_weights::{TrackWeights, WeightRule};
@@ -20,11 +19,10 @@ use crate::simd::lanes::{Lanes, MAX_LANES, Number, canonical};
 use crate::simd::together::Together;
 use crate::time::frame_clock::in_seconds;
 use crate::time::runs::Parameter;
-use crate::time::spans::SpanSource;
+use crate::time::spans::{SpanSource, StoredSource};
 use crate::time::times::interval_at;
 use crate::tracks::set::TrackSet;
 use crate::tracks::track_keys::TrackKeys;
-use crate::twin::Evaluate as _;
 use crate::twin::arc_between::arc_between;
 use crate::twin::evaluate_arc::{norm_squared, on_arc};
 use crate::twin::small_angle::small_angle_cubic;
@@ -67,7 +65,7 @@ pub(crate) struct TracksInLanes {
 
 /// Bytes of an interval whose segment is kept: mostly one span.
 const REST_BYTES: usize =
-    size_of::<PolynomialSegment>() + size_of::<f64>() + size_of::<SpanSource>();
+    size_of::<PolynomialSegment>() + size_of::<f64>() + size_of::<StoredSource>();
 
 impl KeptKeys {
     /// Keeps the keys of a set if its curves can be computed from them, in at most so many bytes; `None` otherwise.
@@ -293,11 +291,10 @@ impl Rest {
         let start = starts[span];
         // An interval may be cut into several spans.
         let end = starts.get(span + 1).map_or(at.end, |next| next.min(at.end));
-        match spans.sources[first + span] {
+        match spans.source(first + span) {
             SpanSource::Segment(index) => {
                 let parameter = in_seconds(end - start).parameter(at.time - start);
-                let value: Vec4 = segments.polynomials[index as usize].at(parameter);
-                value.canonical().to_array()
+                segments.polynomial_at(index, parameter)
             }
             SpanSource::Exact(index) => {
                 let length = end - start;

@@ -19,6 +19,7 @@ use crate::output::window::Window;
 use crate::prepare::preparation::{PART_INTERVALS, SetRequest};
 use crate::prepare::prepared::segment_size;
 use crate::time::frames::Ticks;
+use crate::time::spans::StoredSource;
 use crate::tracks::set::TrackSet;
 
 /// How a clip is evaluated whose segments are prepared.
@@ -56,6 +57,11 @@ pub(crate) enum MachineKind {
 }
 
 impl Limits {
+    /// Whether clips keep packed segments: kernels of devices, and the small engine of a page, do not read them.
+    pub(crate) fn packs_segments(&self) -> bool {
+        !cfg!(smallest) && matches!(self.kind, MachineKind::Cpu { .. })
+    }
+
     /// Whether a device prepares the arcs between so many keys.
     pub(crate) fn prepares_arcs(&self, keys: usize) -> bool {
         self.prepares_arcs_from.is_some_and(|from| keys >= from)
@@ -350,7 +356,7 @@ fn has_sparse_samples(request: &SetRequest<'_>) -> bool {
 
 /// Bytes that a key takes when it is prepared: its segment, its constant, and its span.
 fn key_bytes(interpolation: &Interpolation) -> usize {
-    const SPAN: usize = size_of::<f64>() + 3 * size_of::<u32>();
+    const SPAN: usize = size_of::<f64>() + size_of::<StoredSource>() + size_of::<u32>();
     segment_size(interpolation.form()) + size_of::<Quat>() + SPAN
 }
 

@@ -14,7 +14,7 @@ use crate::shader::{ArcSegment, END_NEGATED, KEY_OF_INTERVAL, START_NEGATED};
 use crate::simd::dispatch::{InLanes, in_lanes};
 use crate::simd::lanes::Lanes;
 use crate::time::runs::NONE;
-use crate::time::spans::SpanSource;
+use crate::time::spans::{SpanSource, StoredSource};
 use crate::tracks::set::TrackSet;
 use crate::tracks::signs::Signs;
 use crate::twin::arc_between::arc_between;
@@ -78,7 +78,8 @@ impl ArcPreparation {
             let indices = segments..segments + intervals.len() as u32;
             let spans = &mut prepared.spans;
             spans.starts.extend_from_slice(&times[intervals.clone()]);
-            spans.sources.extend(indices.map(SpanSource::Segment));
+            let sources = indices.map(|index| StoredSource::from(SpanSource::Segment(index)));
+            spans.sources.extend(sources);
             spans.keys.extend(first_key..last_key);
             let signs = set.signs(index);
             if prepared.segments.are_arcs_listed {

@@ -68,6 +68,9 @@ pub(crate) struct PrepareRequest<'a> {
     pub(crate) lists_arcs: bool,
     /// The only timeline that will be sampled; intervals without a sample of it may be left out.
     pub(crate) only_for: Option<&'a Timeline>,
+    /// Whether polynomials are packed ([`Prepared::pack`]), which pays for clips that are kept; groups that are merged
+    /// are not.
+    pub(crate) packs: bool,
     /// Groups whose memory is reused.
     pub(crate) spare: Vec<Prepared>,
 }
@@ -81,6 +84,7 @@ impl PrepareRequest<'_> {
             large_groups: false,
             lists_arcs: false,
             only_for: None,
+            packs: false,
             spare: Vec::new(),
         }
     }
@@ -113,6 +117,7 @@ fn prepare(
         && interpolation.form() == Form::Arc
         && interpolation.signs == KeySigns::Shortest;
     let first_track = request.batch.tracks().start as u32;
+    let packs = request.packs && request.group_bytes.is_none();
     let spare = Mutex::new(request.spare);
     let stop = stop::current();
     let group = |batch: Batch| {
@@ -137,6 +142,9 @@ fn prepare(
         // The track of a part is relative to the first requested track.
         for part in &mut prepared.parts {
             part.track -= first_track;
+        }
+        if packs {
+            prepared.pack();
         }
         Ok(prepared)
     };
@@ -507,6 +515,7 @@ mod tests {
             for group_bytes in [None, Some(2 << 20), Some(usize::MAX)] {
                 let request = PrepareRequest {
                     group_bytes,
+                    packs: true,
                     ..PrepareRequest::all(&set)
                 };
                 let clip = ClipData::new(&set, method.into(), request).unwrap();
@@ -516,6 +525,10 @@ mod tests {
                     let rooms = [
                         (arcs.len(), arcs.capacity()),
                         (polynomials.len(), polynomials.capacity()),
+                        (
+                            group.segments.packed.len(),
+                            group.segments.packed.capacity(),
+                        ),
                         (group.constants.len(), group.constants.capacity()),
                         (group.spans.starts.len(), group.spans.starts.capacity()),
                     ];

@@ -88,7 +88,7 @@ impl Fitting {
         key: u32,
     ) {
         self.cutter.push(prepared.spans.len(), start, curve, None);
-        prepared.push_span(start, SpanSource::Segment(NONE), key);
+        prepared.push_span(start, SpanSource::Constant(NONE), key);
     }
 
     /// Fits the remaining curves, and replaces the spans of divided curves by those of their parts.

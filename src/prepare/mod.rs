@@ -20,6 +20,7 @@
 //! | [`fast::FastPreparation`] | its fast way, in f32 straight from four keys |
 //! | [`fitting::Fitting`] | its exact way: queues of curves that wait for a full block, and the cutter |
 //! | [`constant_speed::PendingInterval`] | a curve at constant speed, until its whole track is there |
+//! | [`packed::PackedSegments`] | the segments of a clip that is kept on the CPU, without their zeros |
 //! | [`prepared::Prepared`] | the result of preparing a batch |
 //! | [`clip_data::ClipData`] | all that is prepared of a clip, and which parts a track has |
 //!
@@ -46,7 +47,7 @@
 //! starts     0.0   0.5   1.0   0.0   0.7  …   seconds, f64
 //! sources    seg 0 seg 1 exact seg 2 con 5…   index of a segment, a constant or an exact curve
 //! keys       0     1     -     3     4    …   the constant to store at exactly the start
-//! segments   32 bytes an arc, 176 a polynomial
+//! segments   32 bytes an arc, 176 a polynomial; packed 112, 144 or 176
 //! constants  16 bytes: keys, and values held at ends
 //! exact      curves that no polynomial fits, and those outside the keys: the host evaluates them in f64
 //! ```
@@ -57,6 +58,7 @@ pub(crate) mod constant_speed;
 pub(crate) mod error;
 pub(crate) mod fast;
 pub(crate) mod fitting;
+pub(crate) mod packed;
 pub(crate) mod preparation;
 pub(crate) mod prepared;
 pub(crate) mod smooth;

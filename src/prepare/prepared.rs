@@ -3,7 +3,7 @@
 use std::collections::TryReserveError;
 use std::ops::Range;
 
-use bytemuck::Zeroable;
+use bytemuck::{TransparentWrapper as _, Zeroable};
 
 use crate::fit::block::LANES;
 use crate::fit::exact::cut::Cutter;
@@ -11,13 +11,17 @@ use crate::fit::exact::fit::IntervalCurve;
 use crate::math::quaternion::round_quat;
 use crate::memory::OutOfMemoryError;
 use crate::method::interpolation::Interpolation;
+use crate::prepare::packed::{PackedSegments, pack};
 use crate::shader::{ArcSegment, Form, PolynomialSegment};
 use crate::time::frames::{Ticks, Timeline};
 use crate::time::runs::{NONE, Parameter};
-use crate::time::spans::{SpanSource, Spans, TrackExtension, TrackPart};
+use crate::time::spans::{
+    SOURCE_INDEX, SpanSource, Spans, StoredSource, TrackExtension, TrackPart,
+};
 use crate::time::wrap::Wrap;
 use crate::tracks::error::LATEST;
 use crate::tracks::signs::SignBits;
+use crate::twin::Evaluate as _;
 
 /// Segments of some tracks, with the tables by which the segment of a sample is found.
 pub(crate) struct Prepared {
@@ -70,7 +74,12 @@ impl Prepared {
     /// the memory; lists that are reused do not grow to twice their length for a few keys more.
     pub(crate) fn reserve(&mut self, keys: usize) -> Result<(), OutOfMemoryError> {
         let bytes = segment_size(self.segments.form) + size_of::<[f32; 4]>();
-        let refused = |_| OutOfMemoryError::new::<u8>(SEGMENTS, keys.saturating_mul(bytes));
+        let too_many = || OutOfMemoryError::new::<u8>(SEGMENTS, keys.saturating_mul(bytes));
+        // Half of the indices that a span has room for: the rest is for curves that are divided.
+        if keys > SOURCE_INDEX as usize / 2 {
+            return Err(too_many());
+        }
+        let refused = |_| too_many();
         let segments = keys.saturating_add(SPARE_SEGMENTS);
         self.segments.try_reserve_exact(segments).map_err(refused)?;
         self.constants.try_reserve_exact(keys).map_err(refused)?;
@@ -79,7 +88,9 @@ impl Prepared {
 
     /// Removes what only whole tracks need, so that the curves and their spans remain, in no more memory than these take.
     pub(crate) fn keep_curves(&mut self) {
-        if !(self.spans.sources.iter()).any(|source| matches!(source, SpanSource::Constant(_))) {
+        if !(self.spans.sources.iter())
+            .any(|source| matches!(source.source(), SpanSource::Constant(_)))
+        {
             self.constants = Vec::new();
         }
         (self.spans.keys, self.parts) = (Vec::new(), Vec::new());
@@ -89,12 +100,23 @@ impl Prepared {
         self.exact.shrink_to_fit();
     }
 
+    /// Packs its polynomials, if it has any.
+    pub(crate) fn pack(&mut self) {
+        let Segments {
+            polynomials,
+            packed,
+            ..
+        } = &mut self.segments;
+        *packed = pack(polynomials, &mut self.spans.sources);
+    }
+
     /// Bytes of its lists.
     pub(crate) fn bytes(&self) -> usize {
         let Segments {
             arcs,
             intervals,
             polynomials,
+            packed,
             ..
         } = &self.segments;
         let Spans {
@@ -106,6 +128,7 @@ impl Prepared {
         size_of_val(&arcs[..])
             + size_of_val(&intervals[..])
             + size_of_val(&polynomials[..])
+            + size_of_val(&packed[..])
             + size_of_val(&self.constants[..])
             + size_of_val(&self.exact[..])
             + size_of_val(&starts[..])
@@ -119,13 +142,14 @@ impl Prepared {
         self.segments.arcs.clear();
         self.segments.intervals.clear();
         self.segments.polynomials.clear();
+        self.segments.packed.clear();
         self.constants.clear();
         self.exact.clear();
         self.spans.clear();
         self.parts.clear();
     }
 
-    /// Merges all groups into the first, with memory reserved for all at once; `None` if there are no groups.
+    /// Merges all groups, of which none is packed, into the first, with memory reserved for all at once; `None` if there are no groups.
     pub(crate) fn together(groups: Vec<Self>) -> Option<Self> {
         let total = |count: fn(&Self) -> usize| groups.iter().skip(1).map(count).sum();
         let [segments, constants, exact, spans, parts]: [usize; 5] = [
@@ -163,10 +187,12 @@ impl Prepared {
         target.starts.extend(other.spans.starts);
         target
             .sources
-            .extend(other.spans.sources.iter().map(|&source| match source {
-                SpanSource::Segment(i) => SpanSource::Segment(i + segments),
-                SpanSource::Constant(i) => SpanSource::Constant(shift(i)),
-                SpanSource::Exact(i) => SpanSource::Exact(i + exact),
+            .extend(other.spans.sources.iter().map(|stored| {
+                StoredSource::from(match stored.source() {
+                    SpanSource::Segment(i) => SpanSource::Segment(i + segments),
+                    SpanSource::Constant(i) => SpanSource::Constant(shift(i)),
+                    SpanSource::Exact(i) => SpanSource::Exact(i + exact),
+                })
             }));
         target.keys.extend(other.spans.keys.into_iter().map(shift));
         self.parts
@@ -194,31 +220,21 @@ impl Prepared {
         self.exact.extend(other.exact);
     }
 
-    /// Whether a part has one segment for each interval, in order, passes through its keys, which are constants in order,
-    /// and is held outside them: then samples are found by the interval's index alone.
+    /// Whether a part has one segment for each interval, passes through its keys, which are constants in order, and is
+    /// held outside them: then samples are found by the interval's index alone.
     pub(crate) fn is_regular(&self, part: &TrackPart) -> bool {
-        let Some(&SpanSource::Segment(first)) = self.spans.sources.get(part.spans.start) else {
-            return false;
-        };
         let sources = &self.spans.sources[part.spans.clone()];
         let keys = &self.spans.keys[part.spans.clone()];
-        let are_segments = (sources.iter().zip(first..))
-            .all(|(source, index)| matches!(*source, SpanSource::Segment(at) if at == index));
+        let are_segments =
+            (sources.iter()).all(|stored| matches!(stored.source(), SpanSource::Segment(_)));
         let are_keys = keys.iter().zip(part.before..).all(|(&key, at)| key == at);
         let last = part.before.checked_add(part.spans.len() as u32);
         part.extension.is_none()
+            && !part.spans.is_empty()
             && !self.spans.steps
             && are_segments
             && are_keys
             && last == Some(part.after)
-    }
-
-    /// The index of the first segment of a regular part.
-    pub(crate) fn first_segment(&self, part: &TrackPart) -> usize {
-        match self.spans.sources[part.spans.start] {
-            SpanSource::Segment(first) => first as usize,
-            SpanSource::Constant(_) | SpanSource::Exact(_) => 0,
-        }
     }
 
     /// The keys of a regular part, as they were added.
@@ -312,7 +328,7 @@ impl Prepared {
         let segments = &mut self.segments.polynomials;
         let indices = segments.len()..segments.len() + starts.len();
         segments.extend_from_slice(&ZEROS[..starts.len()]);
-        let sources = indices.map(|index| SpanSource::Segment(index as u32));
+        let sources = indices.map(|index| StoredSource::from(SpanSource::Segment(index as u32)));
         self.spans.sources.extend(sources);
         self.spans.starts.extend_from_slice(starts);
         self.spans.keys.extend_from_slice(keys);
@@ -320,7 +336,7 @@ impl Prepared {
 
     pub(crate) fn push_span(&mut self, start: f64, source: SpanSource, key: u32) {
         self.spans.starts.push(start);
-        self.spans.sources.push(source);
+        self.spans.sources.push(source.into());
         self.spans.keys.push(key);
     }
 
@@ -370,7 +386,7 @@ impl Prepared {
     }
 }
 
-/// The segments of one clip, all of one form and in one list: the others stay empty.
+/// The segments of one group, all of one form and in one list: the others stay empty.
 #[derive(Debug, Clone)]
 pub(crate) struct Segments {
     pub(crate) form: Form,
@@ -381,6 +397,8 @@ pub(crate) struct Segments {
     /// [`START_NEGATED`](crate::shader::START_NEGATED) and [`END_NEGATED`](crate::shader::END_NEGATED).
     pub(crate) intervals: Vec<u32>,
     pub(crate) polynomials: Vec<PolynomialSegment>,
+    /// The rows of polynomials that are packed ([`Prepared::pack`]).
+    pub(crate) packed: Vec<[f32; 4]>,
 }
 
 impl Segments {
@@ -391,11 +409,29 @@ impl Segments {
             arcs: Vec::new(),
             intervals: Vec::new(),
             polynomials: Vec::new(),
+            packed: Vec::new(),
         }
     }
 
+    /// The number of segments that are not packed.
     pub(crate) fn len(&self) -> usize {
         self.arcs.len() + self.intervals.len() + self.polynomials.len()
+    }
+
+    /// The polynomials, if they are packed; clips in pages of `tumble view` never are.
+    #[inline(always)]
+    pub(crate) fn packed(&self) -> Option<&PackedSegments> {
+        let is_packed = !cfg!(smallest) && !self.packed.is_empty();
+        is_packed.then(|| PackedSegments::wrap_ref(&self.packed))
+    }
+
+    /// The value of a polynomial at a parameter.
+    #[inline(always)]
+    pub(crate) fn polynomial_at(&self, index: u32, parameter: f32) -> [f32; 4] {
+        match self.packed() {
+            Some(packed) => packed.value_at(index, parameter),
+            None => self.polynomials[index as usize].value_at(parameter),
+        }
     }
 
     pub(crate) fn reserve(&mut self, count: usize) {

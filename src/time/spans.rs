@@ -21,7 +21,7 @@ use crate::time::times::interval_at;
 pub(crate) struct Spans {
     /// Seconds.
     pub(crate) starts: Vec<f64>,
-    pub(crate) sources: Vec<SpanSource>,
+    pub(crate) sources: Vec<StoredSource>,
     /// The constant to store at exactly the start, or [`NONE`].
     pub(crate) keys: Vec<u32>,
     /// Whether keys are held until the next one.
@@ -34,6 +34,44 @@ pub(crate) enum SpanSource {
     Segment(u32),
     Constant(u32),
     Exact(u32),
+}
+
+/// A [`SpanSource`] in the four bytes that a span keeps: the kind in the two highest bits, and the index.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct StoredSource(u32);
+
+/// The bits of a [`StoredSource`] that are the index; a group has fewer segments, constants and curves.
+pub(crate) const SOURCE_INDEX: u32 = (1 << 30) - 1;
+
+impl StoredSource {
+    const CONSTANT: u32 = 1 << 30;
+    const EXACT: u32 = 2 << 30;
+    const NO_CONSTANT: u32 = 3 << 30;
+
+    #[inline(always)]
+    pub(crate) fn source(self) -> SpanSource {
+        let index = self.0 & SOURCE_INDEX;
+        match self.0 & !SOURCE_INDEX {
+            0 => SpanSource::Segment(index),
+            Self::CONSTANT => SpanSource::Constant(index),
+            Self::EXACT => SpanSource::Exact(index),
+            _ => SpanSource::Constant(NONE),
+        }
+    }
+}
+
+impl From<SpanSource> for StoredSource {
+    #[inline(always)]
+    fn from(source: SpanSource) -> Self {
+        let (kind, index) = match source {
+            SpanSource::Constant(NONE) => return Self(Self::NO_CONSTANT),
+            SpanSource::Segment(index) => (0, index),
+            SpanSource::Constant(index) => (Self::CONSTANT, index),
+            SpanSource::Exact(index) => (Self::EXACT, index),
+        };
+        debug_assert!(index <= SOURCE_INDEX, "{source:?}");
+        Self(kind | index)
+    }
 }
 
 /// Some consecutive key intervals of one track: all of them, unless the track is
@@ -115,6 +153,12 @@ impl Spans {
         self.starts.len()
     }
 
+    /// The source of a span.
+    #[inline(always)]
+    pub(crate) fn source(&self, span: usize) -> SpanSource {
+        self.sources[span].source()
+    }
+
     pub(crate) fn reserve(&mut self, count: usize) {
         self.starts.reserve(count);
         self.sources.reserve(count);
@@ -160,7 +204,7 @@ impl Spans {
         // not pass through their keys this is not known, so each span counts as an interval.
         let meets_keys = keys[part.spans.clone()].iter().any(|&key| key != NONE);
         let is_at_key = |&span: &usize| {
-            let stands = matches!(self.sources[span], SpanSource::Constant(_));
+            let stands = matches!(self.source(span), SpanSource::Constant(_));
             keys[span] != NONE || stands || !meets_keys
         };
         let until = part.spans.start..=span;
@@ -240,7 +284,7 @@ impl Spans {
                     }
                 }
                 let count = last - first;
-                match self.sources[span] {
+                match self.source(span) {
                     SpanSource::Segment(index) => {
                         let distance = if block.are_near {
                             let held = first - block.first[j];
@@ -353,7 +397,7 @@ impl Spans {
         t: f64,
     ) -> RunSource {
         let constant = constants.into_iter().find(|&constant| constant != NONE);
-        match (constant, span.map(|span| self.sources[span])) {
+        match (constant, span.map(|span| self.source(span))) {
             (Some(constant), _) | (None, Some(SpanSource::Constant(constant))) => {
                 RunSource::Constant(constant)
             }
@@ -381,7 +425,7 @@ impl Spans {
         if from_start == 0.0 && key != NONE {
             return Some(RunSource::Constant(key));
         }
-        Some(match self.sources[span] {
+        Some(match self.source(span) {
             SpanSource::Constant(constant) => RunSource::Constant(constant),
             SpanSource::Segment(index) => {
                 let parameter = (from_start - length * 0.5) / length;
@@ -451,7 +495,7 @@ impl Spans {
     fn time_source(&self, span: usize, end: f64) -> RunSource {
         let start = self.starts[span];
         let seconds = end - start;
-        match self.sources[span] {
+        match self.source(span) {
             SpanSource::Constant(constant) => RunSource::Constant(constant),
             SpanSource::Exact(index) => {
                 let length = seconds;

@@ -5,33 +5,49 @@ use glam::Vec4;
 
 use crate::shader::PolynomialSegment;
 use crate::simd::lanes::{Lanes, Number};
-pub(crate) use crate::twin::functions::polynomial;
 use crate::twin::functions::{PolynomialBegun, polynomial_begin, polynomial_end};
 use crate::twin::{Evaluate, Parameters, WHOLE_DEGREE};
 
+/// The rows of coefficients of a polynomial of degree `ROWS` - 1: the whole, or one whose other coefficients are +0.
+pub(crate) type Polynomial<const ROWS: usize> = [[f32; 4]; ROWS];
+
+/// The items of [`Evaluate`] that polynomials of every degree have.
+macro_rules! run_of_polynomial {
+    () => {
+        /// A quarter of the lanes: with all four components of a rotation side by side, the
+        /// coefficients of a run nearly fit into the registers.
+        #[inline(always)]
+        fn samples<L: Lanes>() -> usize {
+            L::COUNT / 4
+        }
+
+        #[inline(always)]
+        fn load<L: Lanes>(distances: &[f32]) -> L {
+            L::fourfold_of(distances)
+        }
+
+        type Begun<L: Lanes> = PolynomialBegun<L>;
+        type Vectors<L: Lanes> = [L; 1];
+
+        #[inline(always)]
+        fn begin<L: Lanes, const IS_PIPELINED: bool>(
+            _: L,
+            parameters: &mut impl Parameters<L>,
+        ) -> PolynomialBegun<L> {
+            polynomial_begin(parameters.next())
+        }
+    };
+}
+
+/// The coefficients of these powers in all lanes. Written out: closures are not always inlined.
+macro_rules! repeated {
+    ($rows:expr, $($power:literal)+) => {
+        [$(L::repeated($rows[$power])),+]
+    };
+}
+
 impl Evaluate for PolynomialSegment {
-    /// A quarter of the lanes: with all four components of a rotation side by side, the
-    /// coefficients of a run nearly fit into the registers.
-    #[inline(always)]
-    fn samples<L: Lanes>() -> usize {
-        L::COUNT / 4
-    }
-
-    #[inline(always)]
-    fn load<L: Lanes>(distances: &[f32]) -> L {
-        L::fourfold_of(distances)
-    }
-
-    type Begun<L: Lanes> = PolynomialBegun<L>;
-    type Vectors<L: Lanes> = [L; 1];
-
-    #[inline(always)]
-    fn begin<L: Lanes, const IS_PIPELINED: bool>(
-        _: L,
-        parameters: &mut impl Parameters<L>,
-    ) -> PolynomialBegun<L> {
-        polynomial_begin(parameters.next())
-    }
+    run_of_polynomial!();
 
     #[inline(always)]
     fn degree(&self) -> usize {
@@ -61,16 +77,11 @@ impl Evaluate for PolynomialSegment {
         parameters: &mut impl Parameters<L>,
     ) -> (PolynomialBegun<L>, [L; 1]) {
         let next = polynomial_begin(parameters.next());
-        // Written out: closures are not always inlined.
-        macro_rules! coefficients {
-            ($($power:literal)+) => {
-                [$(L::repeated(self.coefficients[$power])),+]
-            };
-        }
+        let c = &self.coefficients;
         let mut q = match DEGREE {
-            6 => end_of_degree_6(coefficients!(0 1 2 3 4 5 6), begun),
-            8 => end_of_degree_8(coefficients!(0 1 2 3 4 5 6 7 8), begun),
-            _ => polynomial_end(coefficients!(0 1 2 3 4 5 6 7 8 9 10), begun),
+            6 => end_of_degree_6(repeated!(c, 0 1 2 3 4 5 6), begun),
+            8 => end_of_degree_8(repeated!(c, 0 1 2 3 4 5 6 7 8), begun),
+            _ => polynomial_end(repeated!(c, 0 1 2 3 4 5 6 7 8 9 10), begun),
         };
         if FILTER {
             q = q.canonical();
@@ -80,9 +91,49 @@ impl Evaluate for PolynomialSegment {
 
     #[inline(always)]
     fn at(&self, s: f32) -> Vec4 {
-        polynomial(self.coefficients.map(Vec4::from_array), Vec4::splat(s))
+        self.coefficients.at(s)
     }
 }
+
+/// [`Evaluate`] for the rows of polynomials of one degree.
+macro_rules! of_rows {
+    ($rows:literal, $is_short:literal, $end:ident, $($power:literal)+) => {
+        impl Evaluate for Polynomial<$rows> {
+            run_of_polynomial!();
+
+            const IS_SHORT: bool = $is_short;
+
+            #[inline(always)]
+            fn evaluate<
+                L: Lanes,
+                const FILTER: bool,
+                const IS_PIPELINED: bool,
+                const DEGREE: usize,
+            >(
+                &self,
+                _: L,
+                begun: PolynomialBegun<L>,
+                parameters: &mut impl Parameters<L>,
+            ) -> (PolynomialBegun<L>, [L; 1]) {
+                let next = polynomial_begin(parameters.next());
+                let mut q = $end(repeated!(self, $($power)+), begun);
+                if FILTER {
+                    q = q.canonical();
+                }
+                (next, [q])
+            }
+
+            #[inline(always)]
+            fn at(&self, s: f32) -> Vec4 {
+                $end(self.map(Vec4::from_array), polynomial_begin(Vec4::splat(s)))
+            }
+        }
+    };
+}
+
+of_rows!(7, true, end_of_degree_6, 0 1 2 3 4 5 6);
+of_rows!(9, true, end_of_degree_8, 0 1 2 3 4 5 6 7 8);
+of_rows!(11, false, polynomial_end, 0 1 2 3 4 5 6 7 8 9 10);
 
 /// [`polynomial_end`] where the coefficients beyond s⁶ are +0. Its terms with them are zeros, and no other term of its
 /// sums is -0: each ends with a coefficient, which is not, or with such a sum.
@@ -112,6 +163,7 @@ mod tests {
 
     use super::*;
     use crate::math::canonical::canonical;
+    use crate::twin::functions::polynomial;
 
     /// Coefficients of all magnitudes, zeros among them, and parameters at which powers underflow.
     #[test]
@@ -132,16 +184,23 @@ mod tests {
             };
             let whole = polynomial(coefficients, s);
             let begun = polynomial_begin(s);
-            let found = match segment.degree() {
-                6 => end_of_degree_6(std::array::from_fn(|i| coefficients[i]), begun),
-                8 => end_of_degree_8(std::array::from_fn(|i| coefficients[i]), begun),
-                _ => whole,
+            let rows = segment.coefficients;
+            let (found, at) = match segment.degree() {
+                6 => (
+                    end_of_degree_6(std::array::from_fn(|i| coefficients[i]), begun),
+                    rows.first_chunk::<7>().unwrap().at(s),
+                ),
+                8 => (
+                    end_of_degree_8(std::array::from_fn(|i| coefficients[i]), begun),
+                    rows.first_chunk::<9>().unwrap().at(s),
+                ),
+                _ => (whole, rows.at(s)),
             };
-            assert_eq!(
-                found.to_bits(),
-                whole.to_bits(),
-                "{coefficients:?} at {s:e}"
-            );
+            let label = || format!("{coefficients:?} at {s:e}");
+            assert_eq!(found.to_bits(), whole.to_bits(), "{}", label());
+            let bits = |value: Vec4| value.to_array().map(f32::to_bits);
+            assert_eq!(bits(at), bits(segment.at(s)), "{}", label());
+            assert_eq!(at.x.to_bits(), whole.to_bits(), "{}", label());
             assert!(segment.degree() <= degree);
             degrees[(segment.degree() - 6) / 2] += 1;
         }

@@ -58,7 +58,7 @@ use std::slice;
 use bytemuck::NoUninit;
 use glam::Vec4;
 
-use crate::simd::lanes::Lanes;
+use crate::simd::lanes::{Lanes, Number as _};
 
 /// The formula of one form, for segments of constants `x y z w`, of which the middle is the first. A run is evaluated
 /// in iterations; each computes several samples at once.
@@ -113,6 +113,16 @@ pub(crate) trait Evaluate: NoUninit {
 
     /// The rotation at one parameter.
     fn at(&self, parameter: f32) -> Vec4;
+
+    /// The same as samples are stored: [`canonical`](crate::math::canonical::canonical).
+    #[inline(always)]
+    fn value_at(&self, parameter: f32) -> [f32; 4] {
+        self.at(parameter).canonical().to_array()
+    }
+
+    /// Whether segments of this type have the coefficients of one degree alone, and none needs a filter: those of which
+    /// [`Evaluate::is_canonical`] is false are of another type.
+    const IS_SHORT: bool = false;
 
     /// Whether [`canonical`](crate::math::canonical::canonical) would change no component of any sample, so that no
     /// filter is needed. Each component is a sum `m + r`, where `m` is the component of the segment's middle. If

@@ -5,7 +5,8 @@
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 
-use tumble::VectorWidth;
+use glam::Quat;
+use tumble::{Device, Engine, SampleTimes, TrackSet, VectorWidth, method};
 
 /// Instructions that `tumble` executes to evaluate a file, on one thread; nothing
 /// where valgrind is not installed, which in CI it must be.
@@ -21,14 +22,20 @@ fn instructions_with(
     fps: u32,
     width: &str,
 ) -> Option<u64> {
-    let run = Command::new("valgrind")
-        .args(["--tool=callgrind", "--callgrind-out-file=/dev/null"])
-        .arg(env!("CARGO_BIN_EXE_tumble"))
-        .arg("eval")
-        .arg(file)
-        .args(["-m", method, "--fps", &fps.to_string(), "--device", "cpu"])
-        .args(["-o", "-"])
-        .args(options)
+    counted(width, |valgrind| {
+        (valgrind.arg(env!("CARGO_BIN_EXE_tumble")).arg("eval"))
+            .arg(file)
+            .args(["-m", method, "--fps", &fps.to_string(), "--device", "cpu"])
+            .args(["-o", "-"])
+            .args(options)
+    })
+}
+
+/// Instructions of a program with these vectors; `run` adds it and its arguments.
+fn counted(width: &str, run: impl FnOnce(&mut Command) -> &mut Command) -> Option<u64> {
+    let mut valgrind = Command::new("valgrind");
+    valgrind.args(["--tool=callgrind", "--callgrind-out-file=/dev/null"]);
+    let run = run(&mut valgrind)
         .env("RAYON_NUM_THREADS", "1")
         .env("TUMBLE_VECTOR_WIDTH", width)
         .stdout(Stdio::null())
@@ -190,6 +197,81 @@ fn frames_between_neighbouring_keys_cost_no_more_than_they_did() {
                 each < bound,
                 "{width}, {method}: {each:.1} a frame between keys"
             );
+        }
+    }
+}
+
+/// Clips that are kept: rotations of small angles, which come from packed segments, by long runs and by the single
+/// frames between keys at 30 Hz, and poses of a sampler.
+#[test]
+fn rotations_of_kept_clips_cost_no_more_than_they_did() {
+    let has_avx2 = VectorWidth::available().contains(&VectorWidth::Avx2);
+    for (width, bounds) in [("baseline", [0.0; 3]), ("avx2", [0.0; 3])] {
+        if width == "avx2" && !has_avx2 {
+            eprintln!("no AVX2 here: not counted");
+            continue;
+        }
+        for (case, bound) in KEPT.iter().zip(bounds) {
+            let count = |rounds: u32| {
+                counted(width, |valgrind| {
+                    (valgrind.arg(std::env::current_exe().unwrap()))
+                        .args(["--exact", "instructions::evaluates_a_kept_clip"])
+                        .args(["--ignored", "--test-threads=1"])
+                        .env("TUMBLE_TEST_KEPT", format!("{rounds} {case}"))
+                })
+            };
+            let (Some(one), Some(three)) = (count(1), count(3)) else {
+                return;
+            };
+            let each = (three - one) as f64 / 2.0 / KEPT_ROTATIONS as f64;
+            println!("{width}, {case}: {each:.1} instructions a rotation of a kept clip");
+            assert!(each < bound, "{width}, {case}: {each:.1} a rotation");
+        }
+    }
+}
+
+const KEPT: [&str; 3] = ["runs", "frames between keys", "poses"];
+
+const KEPT_ROTATIONS: usize = 16 * 1200;
+
+/// Run by the test above it, in a process of its own.
+#[test]
+#[ignore = "part of rotations_of_kept_clips_cost_no_more_than_they_did"]
+fn evaluates_a_kept_clip() {
+    let Ok(request) = std::env::var("TUMBLE_TEST_KEPT") else {
+        return;
+    };
+    let (rounds, case) = request.split_once(' ').unwrap();
+    let (tracks, seconds) = (16, if case == KEPT[0] { 5 } else { 20 });
+    let times: Vec<f64> = (0..=seconds * 30)
+        .map(|key| f64::from(key) / 30.0)
+        .collect();
+    let mut set = TrackSet::new();
+    for track in 0..tracks {
+        let key = |key: usize| {
+            let at = (track + key) as f32 * 0.05;
+            Quat::from_rotation_y(at.sin()) * Quat::from_rotation_x((at * 0.7).cos())
+        };
+        let keys: Vec<Quat> = (0..times.len()).map(key).collect();
+        set.push("", &times, &keys).unwrap();
+    }
+    let engine = Engine::new(Device::Cpu).unwrap();
+    let clip = engine.upload(&set, method::BESSEL_OVERHAUSER).unwrap();
+    assert!(clip.bytes_per_key() < 145.0);
+    let mut sampler = clip.sampler().unwrap();
+    let frames = KEPT_ROTATIONS / tracks;
+    let frame_times = SampleTimes::fps(if case == KEPT[0] { 240 } else { 60 });
+    let mut output = vec![Quat::IDENTITY; KEPT_ROTATIONS];
+    for _ in 0..rounds.parse().unwrap() {
+        if case == KEPT[2] {
+            for (frame, pose) in output.chunks_mut(tracks).enumerate() {
+                sampler.pose(frame as f64 / 60.0, pose).unwrap();
+            }
+        } else {
+            let request = clip.request(&frame_times).samples(0..frames);
+            request
+                .evaluate_into(bytemuck::cast_slice_mut(&mut output))
+                .unwrap();
         }
     }
 }

@@ -6,7 +6,7 @@ use glam::Vec4;
 use rayon::prelude::*;
 
 use crate::cpu::engine::{CpuEngine, TASK};
-use crate::cpu::evaluate::{SAMPLES_ONE_BY_ONE, one};
+use crate::cpu::evaluate::SAMPLES_ONE_BY_ONE;
 use crate::cpu::short_runs::ShortRuns;
 use crate::cpu::streaming::{RowOutput, Stage};
 use crate::output::encoded::EncodedOutput;
@@ -22,6 +22,7 @@ use crate::time::error::SampleTimesError;
 use crate::time::frame_clock::TrackCopy;
 use crate::time::frames::{Ticks, Timeline};
 use crate::time::runs::RunSource;
+use crate::twin::Evaluate as _;
 use crate::twin::evaluate_arc::{norm_squared, on_arc};
 
 /// The number of tracks whose rows are evaluated before they are transposed into frames: their rotations at one frame
@@ -321,13 +322,14 @@ impl SparseTimes<'_> {
             let times = &self.times[track * self.stride..][samples.clone()];
             for (k, &time) in times.iter().enumerate() {
                 let output_index = i * samples.len() + k;
-                let (index, distance, affine) = match prepared.spans.source_at(part, time) {
+                let (index, parameter) = match prepared.spans.source_at(part, time) {
                     Some(RunSource::Constant(index)) => {
                         self.output[output_index] = prepared.constants[index as usize];
                         continue;
                     }
                     Some(RunSource::Segment(index, distance, affine)) => {
-                        (index as usize, distance.at_sample(0, || time), affine)
+                        let distance = distance.at_sample(0, || time);
+                        (index, distance * affine.scale + affine.offset)
                     }
                     _ => {
                         self.others.push(i);
@@ -337,17 +339,15 @@ impl SparseTimes<'_> {
                 let segments = &prepared.segments;
                 match (segments.form, &mut block) {
                     (Form::Arc, Some(block)) => {
-                        let parameter = distance * affine.scale + affine.offset;
-                        let arc = &segments.arcs[index];
+                        let arc = &segments.arcs[index as usize];
                         block.push::<L>(arc, parameter, output_index, self.output);
                     }
                     (Form::Arc, None) => {
-                        let segment = &segments.arcs[index];
-                        self.output[output_index] = one(segment, affine, distance);
+                        let arc = &segments.arcs[index as usize];
+                        self.output[output_index] = arc.value_at(parameter);
                     }
                     (Form::Polynomial, _) => {
-                        let segment = &segments.polynomials[index];
-                        self.output[output_index] = one(segment, affine, distance);
+                        self.output[output_index] = segments.polynomial_at(index, parameter);
                     }
                 }
             }

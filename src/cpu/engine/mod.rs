@@ -101,8 +101,11 @@ impl CpuEngine {
         };
         let segments = &part.prepared.segments;
         match segments.form {
-            Form::Arc => row.evaluate(&segments.arcs, output),
-            Form::Polynomial => row.evaluate(&segments.polynomials, output),
+            Form::Arc => row.evaluate(&segments.arcs[..], output),
+            Form::Polynomial => match segments.packed() {
+                Some(packed) => row.evaluate(packed, output),
+                None => row.evaluate(&segments.polynomials[..], output),
+            },
         }
     }
 }

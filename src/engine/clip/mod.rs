@@ -86,10 +86,13 @@ impl Clip {
 
     /// The memory that the clip takes on the host for each key, in bytes; 0 for a clip without keys.
     ///
-    /// By default a clip keeps a segment for each key: 68 bytes for an arc, 212 for a polynomial. On the CPU it keeps its
-    /// keys instead (16 bytes each; tracks with the same times share them) if its segments would take more memory than
+    /// By default a clip keeps a segment for each key: 64 bytes for an arc, and 144, 176 or 208 for a polynomial. The
+    /// smaller the rotation between two keys, the fewer coefficients the CPU keeps; nearly all segments of recorded
+    /// motion take 144 bytes. Devices keep all coefficients. On the CPU a clip keeps its keys instead (16 bytes each;
+    /// tracks with the same times share them) if its segments would take more memory than
     /// [`EngineOptions::kept_segments`](crate::EngineOptions::kept_segments) or than the engine may use, and if samples
-    /// can be computed from the keys: for arcs, and for cubics that mostly rotate little between keys.
+    /// can be computed from the keys: for arcs, and for cubics that mostly rotate little between keys. Both limits are
+    /// compared with 208 bytes for each polynomial, because its coefficients are not known before.
     #[must_use]
     pub fn bytes_per_key(&self) -> f64 {
         let bytes = match &self.tracks {

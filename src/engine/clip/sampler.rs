@@ -13,7 +13,7 @@ use bytemuck::Zeroable as _;
 use glam::{Quat, Vec4};
 
 use crate::checks::check_rows;
-use crate::cpu::evaluate::{SAMPLES_ONE_BY_ONE, at_parameter};
+use crate::cpu::evaluate::SAMPLES_ONE_BY_ONE;
 use crate::curve::options::{Ends, Quantity};
 use crate::error::Error;
 use crate::evaluate::uploaded::ClipSource;
@@ -32,6 +32,7 @@ use crate::time::runs::{NONE, Parameter, RunSource};
 use crate::time::spans::{SpanSource, outside};
 use crate::time::times::interval_at;
 use crate::tracks::error::TrackError;
+use crate::twin::Evaluate as _;
 use crate::twin::evaluate_arc::{norm_squared, on_arc};
 
 /// Evaluates a [`Clip`](crate::Clip) at one time after another, on the calling thread
@@ -430,7 +431,7 @@ impl SampledClip {
         match source_at(prepared, part, cursor, time) {
             SpanSource::Segment(index) => {
                 let parameter = cursor.in_seconds.parameter(time - cursor.start);
-                group.at_parameter(index as usize, parameter)
+                group.at_parameter(index, parameter)
             }
             SpanSource::Constant(index) => prepared.constants[index as usize],
             SpanSource::Exact(index) => cursor.exact(prepared, index, time),
@@ -529,7 +530,7 @@ impl SampledClip {
                 let distance = distance.at_sample(0, || time);
                 let parameter = distance * affine.scale + affine.offset;
                 match &self.groups[group] {
-                    SampledGroup::Prepared(group) => group.at_parameter(index as usize, parameter),
+                    SampledGroup::Prepared(group) => group.at_parameter(index, parameter),
                     SampledGroup::Keys(_) => [0.0; 4],
                 }
             }
@@ -551,7 +552,7 @@ fn source_at(prepared: &Prepared, part: &SampledPart, cursor: &Cursor, time: f64
             return SpanSource::Constant(key);
         }
     }
-    prepared.spans.sources[span]
+    prepared.spans.source(span)
 }
 
 /// Tracks of one group with one part each, at a time in the span of their cursor.
@@ -598,7 +599,7 @@ impl TracksAtCursor<'_> {
         let parameter = cursor.in_seconds.parameter(time - cursor.start);
         for (part, value) in parts.iter().zip(output) {
             *value = match source_at(prepared, part, cursor, time) {
-                SpanSource::Segment(index) => group.at_parameter(index as usize, parameter),
+                SpanSource::Segment(index) => group.at_parameter(index, parameter),
                 SpanSource::Constant(index) => prepared.constants[index as usize],
                 SpanSource::Exact(index) => cursor.exact(prepared, index, time),
             };
@@ -620,7 +621,7 @@ impl TracksAtCursor<'_> {
         let lanes = middles[..L::COUNT].iter_mut().zip(&mut tangents);
         for (lane, (middle, tangent)) in lanes.enumerate() {
             let part = parts.get(lane).unwrap_or(&parts[0]);
-            let source = spans.sources[part.first_span + self.cursor.span];
+            let source = spans.source(part.first_span + self.cursor.span);
             let SpanSource::Segment(index) = source else {
                 return self.one_by_one(group, parts, output);
             };
@@ -682,11 +683,11 @@ impl PreparedGroup {
 
     /// The value of a segment at a parameter.
     #[inline(always)]
-    fn at_parameter(&self, index: usize, parameter: f32) -> [f32; 4] {
+    fn at_parameter(&self, index: u32, parameter: f32) -> [f32; 4] {
         let segments = &self.prepared().segments;
         match segments.form {
-            Form::Polynomial => at_parameter(&segments.polynomials[index], parameter),
-            Form::Arc => at_parameter(&self.arcs()[index], parameter),
+            Form::Polynomial => segments.polynomial_at(index, parameter),
+            Form::Arc => self.arcs()[index as usize].value_at(parameter),
         }
     }
 

@@ -18,7 +18,7 @@ use crate::shader::{IS_CONSTANT, LINE, List, NEEDS_CARE, NO_KEY, SpreadRun};
 use crate::time::error::SampleTimesError;
 use crate::time::frames::Ticks;
 use crate::time::runs::NONE;
-use crate::time::spans::{SpanSource, TrackPart};
+use crate::time::spans::{SpanSource, StoredSource, TrackPart};
 use crate::work::lists::spread::{RunCounts, RunRepetitions, SpreadLanes};
 use crate::work::lists::{
     GroupItems, ListRequest, ListRoom, PartsList, Work, WorkChunk, WorkShape, may_be_tiny,
@@ -53,7 +53,7 @@ impl TrackStride {
             constants: 0,
         };
         for (span, next) in zip(first.spans.clone(), second.spans.clone()) {
-            match (spans.sources[span], spans.sources[next]) {
+            match (spans.source(span), spans.source(next)) {
                 (SpanSource::Segment(one), SpanSource::Segment(other)) => {
                     stride.segments = other.wrapping_sub(one);
                 }
@@ -83,13 +83,14 @@ impl TrackStride {
             NONE => other == NONE,
             _ => other != NONE && one.wrapping_add(constants) == other,
         };
-        let is_source = |one, other| match (one, other) {
-            (SpanSource::Segment(one), SpanSource::Segment(other)) => {
-                one.wrapping_add(segments) == other
-            }
-            (SpanSource::Constant(one), SpanSource::Constant(other)) => is_constant(one, other),
-            _ => false,
-        };
+        let is_source =
+            |one: StoredSource, other: StoredSource| match (one.source(), other.source()) {
+                (SpanSource::Segment(one), SpanSource::Segment(other)) => {
+                    one.wrapping_add(segments) == other
+                }
+                (SpanSource::Constant(one), SpanSource::Constant(other)) => is_constant(one, other),
+                _ => false,
+            };
         let (here, there) = (first.spans.clone(), part.spans.clone());
         part.track == first.track + tracks
             && there.len() == here.len()

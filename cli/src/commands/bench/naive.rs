@@ -44,36 +44,35 @@ fn product(key: Quat, [first, second, third]: [Vec3; 3], t: f32) -> Quat {
         * Quat::from_scaled_axis(third * (t * t * t))
 }
 
-/// Every track at one time by [`Quat::slerp`], each after a search.
-pub(crate) fn slerp_pose(set: &TrackSet, time: f64, output: &mut [Quat]) {
-    for (track, rotation) in set.tracks().zip(output) {
-        let (i, t) = search(track, time);
-        *rotation = track.keys[i].slerp(track.keys[i + 1], t);
+/// A cursor for each track, for poses at times that only grow.
+pub(crate) fn cursors(set: &TrackSet) -> Vec<Cursor<'_>> {
+    set.tracks().map(Cursor::new).collect()
+}
+
+/// Every track at one time by [`Quat::slerp`].
+pub(crate) fn slerp_pose(cursors: &mut [Cursor<'_>], time: f64, output: &mut [Quat]) {
+    for (cursor, rotation) in cursors.iter_mut().zip(output) {
+        let t = cursor.advance(time);
+        let (keys, i) = (cursor.track.keys, cursor.interval);
+        *rotation = keys[i].slerp(keys[i + 1], t);
     }
 }
 
-/// Every track at one time as in [`cubic`], each after a search. `known` has the vectors of the interval where each
-/// track was last.
+/// Every track at one time as in [`cubic`]. `known` has the vectors of the interval where each track was last.
 pub(crate) fn cubic_pose(
-    set: &TrackSet,
+    cursors: &mut [Cursor<'_>],
     time: f64,
     known: &mut [(usize, [Vec3; 3])],
     output: &mut [Quat],
 ) {
-    for ((track, rotation), vectors) in set.tracks().zip(output).zip(known) {
-        let (i, t) = search(track, time);
+    for ((cursor, rotation), vectors) in cursors.iter_mut().zip(output).zip(known) {
+        let t = cursor.advance(time);
+        let (track, i) = (cursor.track, cursor.interval);
         if vectors.0 != i {
             *vectors = (i, control_vectors(track, i));
         }
         *rotation = product(track.keys[i], vectors.1, t);
     }
-}
-
-/// The interval of a time, and where in it that is, from 0 to 1.
-fn search(track: Track<'_>, time: f64) -> (usize, f32) {
-    let after = track.times.partition_point(|&key| key <= time);
-    let i = after.saturating_sub(1).min(track.times.len() - 2);
-    (i, parameter(track, i, time))
 }
 
 /// Where in an interval a time is, from 0 to 1.
@@ -104,7 +103,7 @@ fn each_track(
 }
 
 /// The interval of a time that only grows.
-struct Cursor<'a> {
+pub(crate) struct Cursor<'a> {
     track: Track<'a>,
     interval: usize,
 }

@@ -46,11 +46,12 @@ fn of_tracks(
     let mut known = vec![(usize::MAX, [Vec3::ZERO; 3]); tracks];
     let mut contestants: Vec<Contestant<'_, tumble::Error>> = vec![
         Contestant::new("naive (glam), next times", |output: &mut [Quat]| {
+            let mut cursors = naive::cursors(set);
             for &time in played {
                 if method == method::SLERP {
-                    naive::slerp_pose(set, time, output);
+                    naive::slerp_pose(&mut cursors, time, output);
                 } else {
-                    naive::cubic_pose(set, time, &mut known, output);
+                    naive::cubic_pose(&mut cursors, time, &mut known, output);
                 }
             }
             Ok(Vec::new())

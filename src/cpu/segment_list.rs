@@ -1,0 +1,137 @@
+//! The segments of a group, as the CPU's loops read them: alike in a list, or packed, where each is evaluated by the loop
+//! of its degree.
+
+use crate::cpu::evaluate::distances;
+use crate::cpu::streaming::Samples;
+use crate::prepare::packed::{PackedSegment, PackedSegments};
+use crate::simd::lanes::Lanes;
+use crate::time::runs::Affine;
+use crate::twin::Evaluate;
+
+/// Segments by the index that their spans have.
+pub(crate) trait SegmentList {
+    /// As [`Samples::frames`].
+    fn frames<L: Lanes, O: Samples + ?Sized>(
+        &self,
+        index: u32,
+        affine: Affine,
+        first: f32,
+        start: usize,
+        count: usize,
+        output: &mut O,
+    );
+
+    /// As [`distances`].
+    fn distances<L: Lanes>(
+        &self,
+        index: u32,
+        affine: Affine,
+        from_middle: &[f32],
+        output: &mut [[f32; 4]],
+    );
+
+    /// The values at some parameters, one after the other.
+    fn values_at(&self, index: u32, parameters: impl Iterator<Item = f32>, output: &mut [[f32; 4]]);
+}
+
+impl<S: Evaluate> SegmentList for [S] {
+    #[inline(always)]
+    fn frames<L: Lanes, O: Samples + ?Sized>(
+        &self,
+        index: u32,
+        affine: Affine,
+        first: f32,
+        start: usize,
+        count: usize,
+        output: &mut O,
+    ) {
+        output.frames::<L, S>(&self[index as usize], affine, first, start, count);
+    }
+
+    #[inline(always)]
+    fn distances<L: Lanes>(
+        &self,
+        index: u32,
+        affine: Affine,
+        from_middle: &[f32],
+        output: &mut [[f32; 4]],
+    ) {
+        let count = output.len();
+        distances::<L, S>(&self[index as usize], affine, from_middle, count, output);
+    }
+
+    #[inline(always)]
+    fn values_at(
+        &self,
+        index: u32,
+        parameters: impl Iterator<Item = f32>,
+        output: &mut [[f32; 4]],
+    ) {
+        let segment = &self[index as usize];
+        for (value, parameter) in output.iter_mut().zip(parameters) {
+            *value = segment.value_at(parameter);
+        }
+    }
+}
+
+// Written out: closures are not always inlined.
+impl SegmentList for PackedSegments {
+    #[inline(always)]
+    fn frames<L: Lanes, O: Samples + ?Sized>(
+        &self,
+        index: u32,
+        affine: Affine,
+        first: f32,
+        start: usize,
+        count: usize,
+        output: &mut O,
+    ) {
+        match self.get(index) {
+            PackedSegment::Degree6(it) => output.frames::<L, _>(it, affine, first, start, count),
+            PackedSegment::Degree8(it) => output.frames::<L, _>(it, affine, first, start, count),
+            PackedSegment::Degree10(it) => output.frames::<L, _>(it, affine, first, start, count),
+        }
+    }
+
+    #[inline(always)]
+    fn distances<L: Lanes>(
+        &self,
+        index: u32,
+        affine: Affine,
+        from_middle: &[f32],
+        output: &mut [[f32; 4]],
+    ) {
+        let count = output.len();
+        match self.get(index) {
+            PackedSegment::Degree6(it) => {
+                distances::<L, _>(it, affine, from_middle, count, output);
+            }
+            PackedSegment::Degree8(it) => {
+                distances::<L, _>(it, affine, from_middle, count, output);
+            }
+            PackedSegment::Degree10(it) => {
+                distances::<L, _>(it, affine, from_middle, count, output);
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn values_at(
+        &self,
+        index: u32,
+        parameters: impl Iterator<Item = f32>,
+        output: &mut [[f32; 4]],
+    ) {
+        match self.get(index) {
+            PackedSegment::Degree6(it) => {
+                std::slice::from_ref(it).values_at(0, parameters, output);
+            }
+            PackedSegment::Degree8(it) => {
+                std::slice::from_ref(it).values_at(0, parameters, output);
+            }
+            PackedSegment::Degree10(it) => {
+                std::slice::from_ref(it).values_at(0, parameters, output);
+            }
+        }
+    }
+}
