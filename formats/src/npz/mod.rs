@@ -176,9 +176,12 @@ fn read_known(
             );
             return Diagnostic::new(&archive.file, Code::BodyAlone, message);
         }
+        let unreadable = archive.unreadable().map_or(String::new(), |arrays| {
+            format!("; the headers of these cannot be read: {arrays}")
+        });
         let message = format!(
             "no array has a known name (poses, rotations, body_rotations); say what they \
-             are with --map rotations=ARRAY:wxyz,time=ARRAY; there are {}",
+             are with --map rotations=ARRAY:wxyz,time=ARRAY; there are {}{unreadable}",
             archive.listing()
         );
         Diagnostic::new(&archive.file, Code::UnknownArrays, message)
