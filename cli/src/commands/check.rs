@@ -269,6 +269,8 @@ fn fault(folder: &Path, entry: &ManifestEntry, inputs: &InputHashes<'_>) -> Opti
 /// may be checked on another machine than that of their inputs.
 struct InputHashes<'a> {
     inputs: BTreeMap<&'a str, Option<String>>,
+    /// The results, of all clips of an input together, that were made from the input as it is now.
+    made: BTreeSet<&'a str>,
     /// Those of the files that options name.
     of_options: BTreeMap<&'a str, String>,
 }
@@ -286,20 +288,39 @@ impl<'a> InputHashes<'a> {
             || inputs.par_iter().map(|input| hash(input)).collect(),
             || inputs.iter().map(|input| hash(input)).collect(),
         );
+        let inputs: BTreeMap<&str, Option<String>> = hashes.into_iter().collect();
+        let mut counts: BTreeMap<(&str, usize), usize> = BTreeMap::new();
+        for entry in entries {
+            let now = inputs.get(&*entry.input).and_then(Option::as_ref);
+            if now.is_some() && now == entry.input_sha256.as_ref() {
+                *counts.entry(entry.whole()).or_default() += 1;
+            }
+        }
+        let made = counts.into_iter().filter(|((_, all), found)| found >= all);
         let files = entries.iter().flat_map(|entry| &entry.option_files);
         let paths: BTreeSet<&str> = files.map(|file| &*file.path).collect();
         let found = paths.into_iter().filter(|path| Path::new(path).exists());
         Self {
-            inputs: hashes.into_iter().collect(),
+            made: made.map(|((result, _), _)| result).collect(),
+            inputs,
             of_options: found.map(|path| (path, options::content(path))).collect(),
         }
+    }
+
+    /// Whether the input of a result is there, with other bytes than those that the result was made from.
+    fn is_of_other_bytes(&self, entry: &ManifestEntry) -> bool {
+        let now = self.inputs.get(&*entry.input).and_then(Option::as_ref);
+        now.is_some_and(|now| entry.input_sha256.as_ref() != Some(now))
     }
 
     /// The input of a result, or the file of an option, if it is there and has other bytes than those that the result
     /// was made from.
     fn changed(&self, entry: &ManifestEntry) -> Option<String> {
-        let now = self.inputs.get(&*entry.input).and_then(Option::as_ref);
-        if now.is_some_and(|now| entry.input_sha256.as_ref() != Some(now)) {
+        if self.is_of_other_bytes(entry) {
+            // The results of all clips that the input has now are there: this one is of a clip that is gone.
+            if self.made.contains(entry.whole().0) {
+                return None;
+            }
             return Some(format!(
                 "input {} (or a file that belongs to it)",
                 entry.input
@@ -323,14 +344,18 @@ impl<'a> InputHashes<'a> {
             missing.contains(&*entry.input)
                 && InputPresence::of_entry(entry) == InputPresence::Removed
         });
-        let orphans: Vec<&ManifestEntry> = orphans.copied().collect();
+        let mut orphans: Vec<&ManifestEntry> = orphans.copied().collect();
         let removed: BTreeSet<&str> = orphans.iter().map(|entry| &*entry.input).collect();
+        let of_gone_clips = entries
+            .iter()
+            .filter(|entry| self.made.contains(entry.whole().0) && self.is_of_other_bytes(entry));
+        orphans.extend(of_gone_clips);
         if let Some(first) = orphans.first() {
             let results = words::count(orphans.len(), "result");
             let have = if orphans.len() == 1 { "has" } else { "have" };
             words::note(&format!(
-                "{results} {have} no input any more (`tumble eval … --resume --prune` removes what has none), the \
-                 first is {}",
+                "{results} {have} no input any more, or no such clip in it (`tumble eval … --resume --prune` removes \
+                 what has none), the first is {}",
                 first.output
             ));
         }
