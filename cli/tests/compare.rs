@@ -959,13 +959,13 @@ fn directories_are_compared_file_by_file() {
         std::fs::write(path, text).unwrap();
     };
     let text = std::fs::read_to_string(folder.join("a.dat")).unwrap();
-    let turn = |half: f64| format!("# 1 1\n0 1 0 0 0\n1 {} 0 0 {}\n", half.cos(), half.sin());
+    let rotated = |half: f64| format!("# 1 1\n0 1 0 0 0\n1 {} 0 0 {}\n", half.cos(), half.sin());
     for side in ["before", "after"] {
         write(&format!("{side}/same.dat"), &text);
         write(&format!("{side}/only-{side}.dat"), &text);
     }
-    write("before/deep/turn.dat", &turn(0.1));
-    write("after/deep/turn.dat", &turn(0.2));
+    write("before/deep/turn.dat", &rotated(0.1));
+    write("after/deep/turn.dat", &rotated(0.2));
     let line = ["compare", "before", "after"];
     let report = String::from_utf8(succeed(folder, &line).out).unwrap();
     let expected = "deep/turn.dat: angle 11.46°\n2 pairs of files: 1 without a difference, 1 with one\n1 file only in \

@@ -61,6 +61,7 @@ pub static FORMAT: Format = Format {
         Feature::Translations,
         Feature::Scales,
         Feature::Scalars,
+        Feature::Limits,
         Feature::Steps,
         Feature::Lines,
         Feature::Curves,
