@@ -125,7 +125,7 @@ impl LibraryPlan {
                 arguments.results.refuse_base(library)?;
                 let of_formats = listed
                     .into_iter()
-                    .filter(|(name, _)| Format::of(Path::new(name)).is_some())
+                    .filter(|(name, _)| Format::of_input(Path::new(name)).is_some())
                     .filter(|(name, _)| !arguments.inputs.excludes(Path::new(name)));
                 let found = of_formats.map(|(name, size)| {
                     let path = PathBuf::from(format!("{}/{name}", library.display()));
@@ -548,12 +548,12 @@ impl MergeReport {
     }
 }
 
-/// Makes one manifest of the shards in a directory.
+/// Makes one manifest of the shards in a directory. It does not look at the results, which may be in an object store.
 ///
 /// # Errors
 /// When shards are missing, or when the manifest cannot be written.
 pub fn merge(folder: &Path) -> Result<MergeReport, Refused> {
-    let merged = merging::merge(folder)?;
+    let merged = merging::merge(folder, merging::ResultLocation::Store)?;
     Ok(MergeReport {
         results: merged.results,
         shards: merged.shards,

@@ -139,14 +139,18 @@ fn what_cannot_be_compared_is_refused() {
         (
             &["compare", "a.dat"][..],
             2,
-            "two inputs are compared, not 1",
+            "two files or two directories are compared, not 1 file",
         ),
         (
             &["compare", "a.dat", "b.dat", "--exclude", "b.*"],
             2,
-            "two inputs are compared, not 1",
+            "two files or two directories are compared, not 1 file",
         ),
-        (&["compare", "-", "-"], 2, "two inputs are compared, not 1"),
+        (
+            &["compare", "-", "-"],
+            2,
+            "two files or two directories are compared, not 1 file",
+        ),
         (&["compare", "a.dat", "b.dat", "folder/a.dat"], 2, "not 3"),
         (&["compare", "a.dat", "bad.dat"], 4, "bad.dat:2"),
         (
@@ -898,5 +902,104 @@ fn times_outside_the_keys_are_left_out_or_refused() {
         refused.code == 4 && refused.words.contains("none of the times"),
         "{}",
         refused.words
+    );
+}
+
+/// Clocks that are apart: the message has both ranges and the option, and the option makes them one.
+#[test]
+fn an_offset_joins_two_clocks() {
+    let temporary = tempfile::tempdir().unwrap();
+    let folder = temporary.path();
+    let path = |start: f64| -> String {
+        let poses = (0..20).map(|key| {
+            let t = f64::from(key) / 10.0;
+            format!("{} {} {} 0 0 0 0 1\n", start + t, t.sin(), t * t)
+        });
+        poses.collect()
+    };
+    std::fs::write(folder.join("truth.tum"), path(1_700_000_000.0)).unwrap();
+    std::fs::write(folder.join("late.tum"), path(1_700_000_500.25)).unwrap();
+    for more in [&["--ape"][..], &[]] {
+        let refused = run(
+            folder,
+            &[&["compare", "truth.tum", "late.tum"], more].concat(),
+        );
+        assert_eq!(refused.code, 4, "{}", refused.words);
+        for part in [
+            "truth.tum from 1700000000 to 1700000001.9 s, late.tum from 1700000500.25 to 1700000502.15 s",
+            "--time-offset adds seconds to the times of the second (-500.25 lets both begin together)",
+        ] {
+            assert!(refused.words.contains(part), "{}", refused.words);
+        }
+    }
+    let line = [
+        "compare",
+        "truth.tum",
+        "late.tum",
+        "--time-offset",
+        "-500.25",
+    ];
+    let (code, found) = json(folder, &[&line[..], &["--ape", "--json"]].concat());
+    assert_eq!((code, &found["trajectory"]["poses"]), (0, &Value::from(20)));
+    let rmse = found["trajectory"]["ape"]["translation"]["rmse"].as_f64();
+    assert!(rmse.unwrap() < 1e-6, "{found}");
+    let (_, found) = json(folder, &[&line[..], &["--json"]].concat());
+    let span = [1_700_000_000.0, 1_700_000_001.9].map(Value::from);
+    assert_eq!(found["clips"][0]["span"], Value::from(span.to_vec()));
+}
+
+/// Two directories: the files of one name are compared.
+#[test]
+fn directories_are_compared_file_by_file() {
+    let temporary = sample_folder();
+    let folder = temporary.path();
+    let write = |name: &str, text: &str| {
+        let path = folder.join(name);
+        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+        std::fs::write(path, text).unwrap();
+    };
+    let text = std::fs::read_to_string(folder.join("a.dat")).unwrap();
+    let rotated = |half: f64| format!("# 1 1\n0 1 0 0 0\n1 {} 0 0 {}\n", half.cos(), half.sin());
+    for side in ["before", "after"] {
+        write(&format!("{side}/same.dat"), &text);
+        write(&format!("{side}/only-{side}.dat"), &text);
+    }
+    write("before/deep/turn.dat", &rotated(0.1));
+    write("after/deep/turn.dat", &rotated(0.2));
+    let line = ["compare", "before", "after"];
+    let report = String::from_utf8(succeed(folder, &line).out).unwrap();
+    let expected = "deep/turn.dat: angle 11.46°\n2 pairs of files: 1 without a difference, 1 with one\n1 file only in \
+                    before: only-before.dat\n1 file only in after: only-after.dat\n";
+    assert_eq!(report, expected);
+    let (code, found) = json(
+        folder,
+        &[&line[..], &["--json", "--tolerance", "1deg"]].concat(),
+    );
+    assert_eq!(code, 8);
+    assert_eq!(found["missing"][0][0], "only-before.dat");
+    assert_eq!(found["pairs"][0]["file"], "deep/turn.dat");
+    let angle = found["pairs"][0]["angle"].as_f64().unwrap();
+    assert!((angle - 0.2f64.to_degrees()).abs() < 1e-3, "{found}");
+    assert_eq!(found["pairs"][1]["angle"], 0.0);
+    let failed = run(folder, &[&line[..], &["--tolerance", "1deg"]].concat());
+    let expected = "they differ: 1 pair over the limit, 2 files in only one of the directories";
+    assert!(failed.words.contains(expected), "{}", failed.words);
+    write("after/deep/turn.dat", "# 1 1\n0 1 0\n");
+    let failed = run(folder, &line);
+    assert_eq!(failed.code, 3, "{}", failed.words);
+    let report = String::from_utf8(failed.out).unwrap();
+    assert!(report.contains("deep/turn.dat: not compared"), "{report}");
+    write("other/x.dat", &text);
+    let failed = run(folder, &["compare", "before", "other"]);
+    assert!(
+        failed.code == 4 && failed.words.contains("no file of before"),
+        "{}",
+        failed.words
+    );
+    let failed = run(folder, &["compare", "before", "after", "a.dat"]);
+    assert!(
+        failed.words.contains("two files or two directories"),
+        "{}",
+        failed.words
     );
 }

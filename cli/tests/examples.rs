@@ -120,6 +120,8 @@ fn write_inputs(folder: &Path) {
         "chain.dat",
         "walk.dat",
         "clips/a.dat",
+        "before/a.dat",
+        "after/a.dat",
         "walks/a.dat",
         "walks/more/b.dat",
     ] {

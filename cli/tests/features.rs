@@ -257,3 +257,25 @@ fn velocities_of_skeletons_are_those_of_the_motion() {
     }
     assert!(!folder.join("x.npz").exists());
 }
+
+/// HumanML3D's numbers are steps at 20 frames a second, in metres.
+#[test]
+fn humanml3d_of_other_units_is_said() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let human = crate::retarget::human(|role| role);
+    fs::write(folder.join("take.bvh"), human).unwrap();
+    let made = line(folder, "features take.bvh --sets humanml3d -o a.npz");
+    for part in [
+        "HumanML3D has 20 frames a second, and its numbers are steps from frame to frame; these are of 25 frames a \
+         second (--fps 20)",
+        "HumanML3D is in metres, and the body is ",
+    ] {
+        assert!(made.words.contains(part), "{}", made.words);
+    }
+    let made = line(
+        folder,
+        "features take.bvh --fps 20 --scale 0.01 --sets humanml3d -o b.npz",
+    );
+    assert!(!made.words.contains("warning"), "{}", made.words);
+}

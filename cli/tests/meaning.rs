@@ -434,3 +434,178 @@ fn rotations_that_are_lost_are_said() {
         "warning[W917]: nothing follows 1 joint of the input; of these, `Tail` rotates by up to 30.0°, which is lost",
     );
 }
+
+/// A wheel that turns for long has coarse angles in f32, and the step is said.
+#[test]
+fn coarse_steps_of_angles_are_said() {
+    let temporary = tempfile::tempdir().unwrap();
+    let folder = temporary.path();
+    let robot = r#"<robot name="cart"><link name="base"/><link name="rim"/><joint name="wheel" type="continuous">
+      <parent link="base"/><child link="rim"/><axis xyz="0 1 0"/></joint></robot>"#;
+    fs::write(folder.join("cart.urdf"), robot).unwrap();
+    for (name, last) in [("short", 100), ("long", 4000)] {
+        let mut text = "t,wheel.scalar_angle\n".to_owned();
+        for key in 0..=last {
+            let angle = (2.5 * f64::from(key)).rem_euclid(std::f64::consts::TAU);
+            let _ = writeln!(text, "{},{angle}", f64::from(key) / 4.0);
+        }
+        fs::write(folder.join(format!("{name}.csv")), text).unwrap();
+    }
+    let made = line(folder, "convert long.csv --robot cart.urdf -o long.npz");
+    says(
+        &made,
+        "warning[W918]: `wheel` reaches 10000 rad: keys are f32, whose steps are 9.8e-4 rad there; shorter files have finer steps",
+    );
+    let made = line(folder, "convert short.csv --robot cart.urdf -o short.npz");
+    assert!(!made.words.contains("W918"), "{}", made.words);
+}
+
+/// The states of a data set are the robot's joints, and its actions are left out, which is said.
+#[test]
+fn a_group_of_scalars_is_the_robot() {
+    let temporary = claw();
+    let folder = temporary.path();
+    let column = |group: &str, joint: &str, kind: &str| format!("{group}{joint}.scalar_{kind}");
+    let write = |name: &str, groups: &[&str]| {
+        let joints = [("lift", "length"), ("grip", "angle")];
+        let columns = groups
+            .iter()
+            .flat_map(|group| joints.map(|(joint, kind)| column(group, joint, kind)));
+        let columns: Vec<String> = columns.collect();
+        let mut text = format!("t,{}\n", columns.join(","));
+        for row in 0..3 {
+            let cells = (0..columns.len()).map(|cell| format!("0.{row}{cell}"));
+            let _ = writeln!(text, "0.{row},{}", cells.collect::<Vec<_>>().join(","));
+        }
+        fs::write(folder.join(name), text).unwrap();
+    };
+    let both = ["observation.state.", "action."];
+    write("both.csv", &both);
+    let made = line(folder, "convert both.csv --robot claw.urdf -o both.npz");
+    says(
+        &made,
+        "warning[W919]: the joints of the robot are those called `observation.state.…`; these scalars are left out: \
+         `action.lift`, `action.grip`",
+    );
+    let info = line(folder, "info both.npz --json");
+    let info: Value = serde_json::from_slice(&info.out).unwrap();
+    let scalars = info[0]["scalars"].as_array().unwrap();
+    assert_eq!(scalars.len(), 2, "{info}");
+    assert_eq!(scalars[1]["name"], "grip");
+    let largest = scalars[1]["range"][1].as_f64().unwrap();
+    assert!((largest - 0.21).abs() < 1e-6, "{info}");
+    write("two.csv", &["left.", "right."]);
+    refused(
+        folder,
+        "convert two.csv --robot claw.urdf -o two.npz",
+        "the file has the robot's joints more than once, as `left.…`, `right.…`",
+    );
+}
+
+/// A table in text has no place for the limits of joints.
+#[test]
+fn limits_that_are_lost_are_said() {
+    let temporary = claw();
+    let folder = temporary.path();
+    let convert = format!("convert take.csv {CLAW_MAP} --robot claw.urdf -o");
+    let made = line(folder, &format!("{convert} out.csv"));
+    says(
+        &made,
+        "CSV cannot store this, left out: the limits of the joints",
+    );
+    let made = line(folder, &format!("{convert} out.npz"));
+    assert!(!made.words.contains("W208"), "{}", made.words);
+}
+
+/// Text that ends inside its last number, as an interrupted copy leaves it.
+#[test]
+fn a_cut_last_number_is_said() {
+    let temporary = tempfile::tempdir().unwrap();
+    let folder = temporary.path();
+    let walk = fs::read_to_string(root().join("data/walk.bvh")).unwrap();
+    let poses = (0..9).fold(String::new(), |mut text, key| {
+        let _ = writeln!(
+            text,
+            "{key}.25 0.5000 0.2500 0.1250 0.0000 0.0000 0.6000 0.8000"
+        );
+        text
+    });
+    let table = format!("t,x,y,z,qx,qy,qz,qw\n{}", poses.replace(' ', ","));
+    for (name, text) in [
+        ("walk.bvh", &walk),
+        ("poses.tum", &poses),
+        ("poses.csv", &table),
+    ] {
+        let text = text.trim_end();
+        fs::write(folder.join(name), text).unwrap();
+        let made = line(folder, &format!("convert {name} -o whole.npz --overwrite"));
+        assert!(!made.words.contains("W006"), "{name}: {}", made.words);
+        // Also for lengths that remain numbers near enough to those of a rotation.
+        let cut = text.trim_end_matches('0').len() - usize::from(name == "walk.bvh");
+        fs::write(folder.join(name), &text[..cut]).unwrap();
+        let made = line(folder, &format!("convert {name} -o cut.npz --overwrite"));
+        says(
+            &made,
+            "warning[W006]: the file ends in the middle of a line",
+        );
+    }
+}
+
+/// Results of clips that a file no longer has are not made again by --resume, as changed ones are.
+#[test]
+fn results_of_clips_that_are_gone_are_told_apart() {
+    let temporary = tempfile::tempdir().unwrap();
+    let folder = temporary.path();
+    fs::create_dir(folder.join("in")).unwrap();
+    let two = BROKEN.replace("\"sampler\":7", "\"sampler\":0");
+    fs::write(folder.join("in/hero.gltf"), &two).unwrap();
+    let eval = "eval in -o out --fps 10 --to npz --device cpu";
+    line(folder, eval);
+    let one = two.split(",\n{\"name\":\"two\"").next().unwrap();
+    fs::write(folder.join("in/hero.gltf"), format!("{one}]}}")).unwrap();
+    let stale = run(folder, &words("check out"));
+    assert_eq!(stale.code, 8, "{}", stale.words);
+    says(&stale, "2 of 2 results changed");
+    line(folder, &format!("{eval} --resume"));
+    let check = run(folder, &words("check out"));
+    assert_eq!(check.code, 8, "{}", check.words);
+    for part in [
+        "out/hero.one.npz: its input in/hero.gltf has no such clip any more",
+        "2 of 3 results of clips that are gone; `tumble eval … --resume --prune` removes those of clips that are gone",
+    ] {
+        says(&check, part);
+    }
+    line(folder, &format!("{eval} --resume --prune"));
+    line(folder, "check out");
+}
+
+#[test]
+fn results_that_differ_in_case_alone_are_said() {
+    let temporary = sample_folder();
+    let folder = temporary.path();
+    fs::create_dir(folder.join("in")).unwrap();
+    for name in ["WALK.dat", "Walk.dat", "run.dat"] {
+        fs::copy(folder.join("a.dat"), folder.join("in").join(name)).unwrap();
+    }
+    if fs::read_dir(folder.join("in")).unwrap().count() < 3 {
+        return; // this file system ignores case
+    }
+    let made = line(folder, "eval in -o out --device cpu");
+    says(
+        &made,
+        "warning: WALK.npy and Walk.npy differ in case alone: copied to Windows or macOS, one would replace the other",
+    );
+}
+
+#[test]
+fn expressions_of_xacro_are_called_so() {
+    let temporary = claw();
+    let folder = temporary.path();
+    let text = CLAW.replace("<axis xyz=\"0 0 1\"/>", "<axis xyz=\"0 0 ${up}\"/>");
+    fs::write(folder.join("macro.urdf"), text).unwrap();
+    refused(
+        folder,
+        "info macro.urdf",
+        "`xyz` has `${up}`, an expression of xacro, which is not computed; write the URDF by `xacro FILE > robot.urdf`",
+    );
+}

@@ -130,6 +130,25 @@ fn missing_shards_are_named_and_made() {
     assert_eq!(tree(&folder.join("out")), tree(&folder.join("one")));
 }
 
+/// Merging finds results that are gone or cut, and leaves the shards as they are until these are made again.
+#[test]
+fn missing_results_are_not_merged() {
+    let (temporary, bytes) = library();
+    let folder = temporary.path();
+    succeed(folder, &["eval", "walks", "-o", "one"]);
+    succeed(folder, &shard("out", &bytes, "1/1", &[]));
+    fs::remove_file(folder.join("out/02.npy")).unwrap();
+    fs::write(folder.join("out/deep/03.npy"), "cut").unwrap();
+    let merged = run(folder, &["merge", "out"]);
+    assert_eq!(merged.code, 8, "{}", merged.words);
+    let expected = "2 of 12 results missing or damaged (the first: 02.npy cannot be read: ";
+    assert!(merged.words.contains(expected), "{}", merged.words);
+    assert!(!folder.join("out/manifest.jsonl").exists());
+    succeed(folder, &shard("out", &bytes, "1/1", &["--resume"]));
+    succeed(folder, &["merge", "out"]);
+    assert_eq!(tree(&folder.join("out")), tree(&folder.join("one")));
+}
+
 /// A shard is done when its record is there and its inputs and outputs have the recorded hashes.
 #[test]
 fn resuming_looks_at_bytes() {

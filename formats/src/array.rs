@@ -274,7 +274,15 @@ impl<'a> Scanner<'a> {
             let end = self.text.find(|c| !is_digit(c)).unwrap_or(self.text.len());
             let (digits, rest) = self.text.split_at(end);
             let length = digits.parse::<usize>();
-            shape.push(length.map_err(|_| format!("`{digits}` in `shape` is not a length"))?);
+            shape.push(length.map_err(|_| {
+                let shown: String = self
+                    .text
+                    .chars()
+                    .take_while(|c| !",)".contains(*c))
+                    .take(24)
+                    .collect();
+                format!("`{shown}` in `shape` is not a length")
+            })?);
             // Python 2 wrote long integers with an L.
             self.text = rest.strip_prefix('L').unwrap_or(rest);
             if !self.take(',') {

@@ -163,19 +163,11 @@ fn check_comment<R: BufRead>(lines: &Lines<R>, line: &str) -> Result<(), Diagnos
 struct Row<'a, T> {
     tokens: T,
     line: &'a str,
-    /// Column and digits of the last number, and the smallest number of digits of those before it.
-    last: (u64, usize),
-    fewest_digits: usize,
 }
 
 impl<'a, T: Iterator<Item = (u64, &'a str)>> Row<'a, T> {
-    fn new(line: &'a str, tokens: T, fewest_digits: usize) -> Self {
-        Self {
-            tokens,
-            line,
-            last: (1, usize::MAX),
-            fewest_digits,
-        }
+    fn new(line: &'a str, tokens: T) -> Self {
+        Self { tokens, line }
     }
 
     /// Reads the next number, with its column.
@@ -189,8 +181,6 @@ impl<'a, T: Iterator<Item = (u64, &'a str)>> Row<'a, T> {
             let message = format!("`{token}` is too small for f32; it becomes 0");
             lines.warn(column, Code::Tiny, message);
         }
-        self.fewest_digits = self.fewest_digits.min(self.last.1);
-        self.last = (column, number.digits);
         Ok((column, number.value))
     }
 }
@@ -201,8 +191,6 @@ struct DatKeys {
     rows: Blocks<Quat>,
     /// The first blank line since the last key.
     blank: Option<u64>,
-    /// The smallest number of digits of any number.
-    fewest_digits: usize,
     /// Number of keys whose first component is near 0 and whose last one is near 1.
     w_last: u64,
     total: u64,
@@ -215,7 +203,6 @@ impl DatKeys {
             times: Blocks::new(1),
             rows: Blocks::new(count),
             blank: None,
-            fewest_digits: usize::MAX,
             w_last: 0,
             total: 0,
             previous: Vec::new(),
@@ -239,7 +226,7 @@ impl DatKeys {
         lines: &mut Lines<R>,
         line: &str,
     ) -> Result<(), Diagnostic> {
-        let mut row = Row::new(line, tokens(line), self.fewest_digits);
+        let mut row = Row::new(line, tokens(line));
         let (_, time) = row.next(lines)?;
         self.check_time(lines, time)?;
         for index in 0..self.rows.width() {
@@ -253,14 +240,6 @@ impl DatKeys {
             self.check_columns(lines, line)?;
         }
         self.times.push(time);
-        // If a file is cut within its last number, the rest may still be a valid number.
-        let (column, digits) = row.last;
-        if !lines.ended && digits < row.fewest_digits {
-            let message = "the file ends in the middle of a line, and its last number is shorter \
-                           than all others; is it truncated?";
-            lines.warn(column, Code::MaybeCut, message);
-        }
-        self.fewest_digits = row.fewest_digits.min(digits);
         Ok(())
     }
 

@@ -300,7 +300,7 @@ codes! {
     HeaderWords = "W003", "words after the header's numbers", "They are ignored.";
     BoxLengthSign = "W004", "a box length that is not positive", "Rotations do not need it; drawing the boxes does.";
     BlankLine = "W005", "a blank line between keys", "It is ignored. Check whether a key is missing there.";
-    MaybeCut = "W006", "the last number may be cut", "The file does not end with a line end, and its last number has fewer digits than all others. It may be truncated.";
+    MaybeCut = "W006", "the last number may be cut", "The file does not end with a line end, and its last number has fewer decimals than the last numbers of the lines above it. If the file was cut while it was copied, the rest of the number is missing; copy the file again.";
     Tiny = "W007", "a number too small for f32", "It becomes 0.";
     NormOff = "W008", "a quaternion far from unit length", "It is normalised.";
     Order = "W009", "components may be in the order x y z w", "Every fourth column is near 1 and the first near 0, as when small rotations are written with w last. This format has w first.";
@@ -360,7 +360,7 @@ codes! {
     AssumedRate = "W903", "a rate that is assumed", "The file has neither times nor a rate, and all files of its kind have the same rate. `--source-fps` sets another rate.";
     JointLimits = "W904" elsewhere, "joints outside their limits", "The robot's file has limits of the joint, and the motion exceeds them. No value is changed; `--limits clamp` keeps joints inside, `--limits refuse` makes this an error.";
     RobotMerged = "W905" elsewhere, "bodies that MuJoCo merges", "If `fusestatic` is set, MuJoCo merges bodies without joints into their parents. Then the numbers of bodies differ; the names are the same.";
-    UnnamedJoints = "W906", "joints without names", "The file has a number for each joint and does not name them. They are numbered in the order of the file, which depends on the program that wrote it. `--robot FILE`, in Python `robot=`, gives them the names of the joints in a robot's file.";
+    UnnamedJoints = "W906", "joints without names", "The file has a number for each joint and does not name them. They are numbered in the order of the file, which depends on the program that wrote it. `--robot FILE`, in Python `robot=`, gives them the names of the joints in a robot's file. The numbers of a list in a table, such as `action` of LeRobot, get names by `--map`, as in `left_knee=action[3]:scalar:angle`.";
     QuaternionOrder = "W907", "a quaternion whose order is doubtful", "The first component is large and the last small, as for a robot that stands upright if w is first. The columns have no names; state the order with `--source-order`.";
     TranslationsDropped = "W910" elsewhere, "translations of joints that are lost", "On the target skeleton, only the hips have translations. Other joints of the source also move relative to their parents; the message has the largest distance.";
     InertObjects = "W911", "objects of classes that are not read", "Only the names of their classes are kept; no code is run. If the motion needs the value of such an object, this is an error (E912).";
@@ -370,6 +370,8 @@ codes! {
     AngleJumps = "W915" elsewhere, "angles that jump by more than half a turn", "Between two keys an angle changes by more than half a turn. The program that wrote the file may have wrapped angles to one turn. The angle is interpolated as stored, the long way around. `--robot` unwraps hinges without limits; otherwise unwrap the angles first (numpy.unwrap).";
     FollowingJoints = "W916" elsewhere, "joints that follow others", "In the robot's file, the joint follows another joint (`mimic`): its value is that of the other joint times a factor, plus an offset. This value is computed and used instead of the values in the file; the message has the largest difference between both.";
     RotationsDropped = "W917" elsewhere, "rotations of joints that are lost", "Joints of the input move, but no joint of the target follows them. `tumble retarget` pairs the parts of the body, and other joints with the same name and the same joints above them. `--bones` pairs further joints by name.";
+    CoarseAngles = "W918" elsewhere, "angles in coarse steps", "Keys are f32, whose steps grow with the number: 6e-5 rad at 512 rad, 5e-4 rad at 5 000 rad. An angle that was unwrapped counts from whole turns near the middle of its range, so half of its range decides. Where this matters, cut the file into shorter ones: each counts from its own middle. Velocities of such angles have errors of about one step per interval between keys.";
+    OtherScalars = "W919" elsewhere, "scalars that are no joints of the robot", "The scalars of the file are in groups, such as `observation.state.` and `action.` of LeRobot, and the names of one group are those of the robot's joints. The others are left out. If a joint is in two groups, one of states and one of actions, the states count: the actions are what was commanded.";
 }
 
 impl Code {

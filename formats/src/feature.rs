@@ -23,6 +23,8 @@ pub enum Feature {
     Scales,
     /// Scalars: numbers over time beside the tracks, such as the angles of a robot's joints.
     Scalars,
+    /// The smallest and the largest value of scalars that joints allow.
+    Limits,
     /// Channels that keep the value of each key until the next one.
     Steps,
     /// Channels that join their keys by straight lines and the shorter arcs. The keys of a file without this feature
@@ -54,7 +56,7 @@ pub enum Feature {
 
 impl Feature {
     /// All features.
-    pub const ALL: [Self; 21] = [
+    pub const ALL: [Self; 22] = [
         Self::SeveralTracks,
         Self::Quaternions,
         Self::TrackNames,
@@ -64,6 +66,7 @@ impl Feature {
         Self::Translations,
         Self::Scales,
         Self::Scalars,
+        Self::Limits,
         Self::Steps,
         Self::Lines,
         Self::Curves,
@@ -80,7 +83,7 @@ impl Feature {
 
     /// The features that tables of many clips store.
     #[cfg(feature = "parquet")]
-    pub(crate) const OF_TABLES: [Self; 15] = [
+    pub(crate) const OF_TABLES: [Self; 16] = [
         Self::SeveralTracks,
         Self::Quaternions,
         Self::TrackNames,
@@ -89,6 +92,7 @@ impl Feature {
         Self::Translations,
         Self::Scales,
         Self::Scalars,
+        Self::Limits,
         Self::Curves,
         Self::World,
         Self::SeveralClips,
@@ -111,6 +115,7 @@ impl Feature {
             Self::Translations => "translations",
             Self::Scales => "scales",
             Self::Scalars => "scalars",
+            Self::Limits => "limits of joints",
             Self::Steps => "steps",
             Self::Lines => "linear interpolation",
             Self::Curves => "smooth interpolation",

@@ -422,3 +422,55 @@ fn list(shape: &[usize], numbers: &[f64]) -> Vec<u8> {
     let items = numbers.chunks(each).flat_map(|part| list(inner, part));
     [b'('].into_iter().chain(items).chain(*b"l").collect()
 }
+
+/// An array of floats.
+fn floats(shape: &str, values: &[f64]) -> Vec<u8> {
+    let header = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': {shape}, }}");
+    let numbers = values.iter().flat_map(|value| value.to_le_bytes());
+    let start = &b"\x93NUMPY\x01\0\x76\0"[..];
+    let header = format!("{header:117}\n");
+    [start, header.as_bytes(), &numbers.collect::<Vec<u8>>()].concat()
+}
+
+/// Names in arrays of objects, as `np.array(names, dtype=object)` stores them, name the joints; where an array of names
+/// has no texts, and where an array cannot be read, this is said.
+#[test]
+fn names_of_joints_are_never_lost_silently() {
+    let file = |names: Vec<u8>, more: Option<(&str, Vec<u8>)>| {
+        let mut arrays = vec![
+            ("fps", floats("()", &[30.0])),
+            ("body_positions", floats("(2, 1, 3)", &[0.0; 6])),
+            (
+                "body_rotations",
+                floats("(2, 1, 4)", &[1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]),
+            ),
+            ("dof_positions", floats("(2, 2)", &[0.1, 0.2, 0.3, 0.4])),
+            ("dof_names", names),
+        ];
+        arrays.extend(more);
+        read_npz("motion.npz", archive(&arrays), &ReadOptions::default())
+    };
+    let names = || objects("(2,)", "(S'knee'\nS'hip'\nl");
+    let loaded = file(names(), None).unwrap();
+    let set = &loaded.clips[0].set;
+    assert_eq!(set.scalar_named("knee"), Some(0));
+    assert_eq!(set.scalar(1).unwrap().keys, [0.2, 0.4]);
+    assert!(loaded.warnings.is_empty(), "{:?}", loaded.warnings);
+
+    let refused = file(objects("(2,)", "(I1\nI2\nl"), None).unwrap_err();
+    assert_eq!(refused.code, Code::ElementType);
+    assert!(
+        refused.message.contains("no text; save its texts as such"),
+        "{refused}"
+    );
+
+    let damaged = floats("(-5, 2)", &[0.0; 4]);
+    let loaded = file(names(), Some(("joint_vel", damaged.clone()))).unwrap();
+    let warning = loaded.warnings[0].to_string();
+    let expected = "the headers of these arrays cannot be read: `joint_vel` (";
+    assert!(warning.contains(expected), "{warning}");
+    let only = archive(&[("joint_pos", damaged)]);
+    let refused = read_npz("cut.npz", only, &ReadOptions::default()).unwrap_err();
+    let expected = "the headers of these cannot be read: `joint_pos` (";
+    assert!(refused.message.contains(expected), "{refused}");
+}

@@ -304,6 +304,7 @@ fn scalars_are_compared_by_name() {
     let pair = ClipPair {
         inputs: ["first", "second"],
         clips: [&first, &second],
+        offset: 0.0,
     };
     let frames = SampleTimes::at(TIMES.to_vec());
     let found = pair.differences(&engine(), &frames, false).unwrap();

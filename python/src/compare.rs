@@ -491,6 +491,7 @@ fn of_clips(
     let pair = ClipPair {
         inputs: ["the first clip", "the second clip"],
         clips: [&clips[0], &clips[1]],
+        offset: 0.0,
     };
     let common = pair.common_times().map_err(of_compare)?;
     let mut warning = common.warning.clone();
@@ -591,6 +592,7 @@ pub(crate) fn path_errors(
         is_absolute: true,
         step: step.transpose()?,
         max_gap,
+        offset: 0.0,
     };
     let one_of = |clip: &Bound<'_, Clip>, name: &str| {
         let clip = clip.get();

@@ -138,6 +138,11 @@ impl Inputs {
         self.format(path).takes(FormatOption::Keyframes) && !self.reading.reads_file_keys()
     }
 
+    /// Whether there is a list of inputs.
+    pub(crate) fn has_list(&self) -> bool {
+        self.files_from.is_some()
+    }
+
     /// The paths that the command line names.
     pub(crate) fn named_paths(&self) -> &[PathBuf] {
         &self.paths
@@ -694,7 +699,7 @@ impl GatheredInputs {
         for entry in walk {
             let is_input = match &entry {
                 Ok(entry) if entry.file_type().is_dir() => continue,
-                Ok(entry) if Format::of(entry.path()).is_none() => {
+                Ok(entry) if Format::of_input(entry.path()).is_none() => {
                     self.unread.add(entry.path());
                     continue;
                 }
@@ -739,7 +744,7 @@ fn count_inputs(directory: &Path, selection: &InputSelection<'_>) -> usize {
     }
     let walk = WalkDir::new(directory).follow_links(true).into_iter();
     let is_input = |entry: &walkdir::DirEntry| {
-        entry.file_type().is_file() && Format::of(entry.path()).is_some()
+        entry.file_type().is_file() && Format::of_input(entry.path()).is_some()
     };
     walk.flatten().filter(is_input).count()
 }
@@ -768,7 +773,7 @@ fn unreadable(error: &walkdir::Error) -> UnreadableEntry {
         .symlink_metadata()
         .is_ok_and(|found| found.is_symlink());
     match error.io_error().map(io::Error::kind) {
-        Some(io::ErrorKind::NotFound) if is_link && Format::of(path).is_none() => {
+        Some(io::ErrorKind::NotFound) if is_link && Format::of_input(path).is_none() => {
             UnreadableEntry::Other
         }
         Some(io::ErrorKind::NotFound | io::ErrorKind::PermissionDenied) | None => {

@@ -15,7 +15,7 @@ use crate::arguments::input::{FoundInput, GatheredInputs};
 use crate::batch::entry::{self, InputEntry};
 use crate::batch::manifest::{Manifest, ManifestOptions};
 use crate::batch::owner::ReplacedOwners;
-use crate::batch::result_names::{ResultName, ResultNaming, format, name_results};
+use crate::batch::result_names::{ResultName, ResultNaming, format, name_results, warn_of_case};
 use crate::batch::shards::plan::{RecordedPlan, hash_of};
 use crate::batch::shards::record;
 use crate::batch::target::{self, Destination, ResultTarget, choose, extensions, of};
@@ -131,6 +131,7 @@ fn in_folder(
     let format = format(folder, options.format)?;
     let files = without_results(inputs.files.clone(), folder)?;
     let names = name_results(&files, folder, format, options.naming);
+    warn_of_case(&names);
     let shards = RecordedPlan::read(folder)?;
     if let Some(recorded) = &shards {
         refuse_shards(recorded, &names, folder, options)?;

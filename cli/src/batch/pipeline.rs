@@ -900,7 +900,7 @@ pub(super) fn clip_files(
 
 /// The names of the clips' files: the clips' names, with characters that file systems refuse replaced;
 /// names that are then equal get the clip's index appended.
-pub(super) fn clip_file_names(clips: &[Motion]) -> Vec<String> {
+pub(crate) fn clip_file_names(clips: &[Motion]) -> Vec<String> {
     let is_plain = |c: char| c.is_alphanumeric() || matches!(c, '-' | '_' | '.' | ' ');
     let plain = |clip: &Motion| -> String {
         let name = clip.name.clone().unwrap_or_else(|| clip.index.to_string());

@@ -86,8 +86,8 @@ impl fmt::Display for PreviewedResult {
             }
             write!(f, " → {output}")?;
         }
-        let reason = self.reason.iter();
-        reason.map(|reason| write!(f, " ({reason})")).collect()
+        let mut reason = self.reason.iter();
+        reason.try_for_each(|reason| write!(f, " ({reason})"))
     }
 }
 

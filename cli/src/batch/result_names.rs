@@ -10,7 +10,7 @@ use crate::arguments::input::FoundInput;
 use crate::batch::shards::record;
 use crate::batch::target::{self, choose};
 use crate::messages::exit::Failure;
-use crate::messages::names;
+use crate::messages::{names, words};
 
 /// The path of an input's result below the directory of results, or why it has none.
 pub(crate) type ResultName = Result<String, Failure>;
@@ -147,6 +147,25 @@ pub(crate) fn name_results(
         }
     });
     checked.collect()
+}
+
+/// Warns of results whose names differ in case alone: on file systems that ignore case they are one file.
+pub(crate) fn warn_of_case(results: &[ResultName]) {
+    let mut seen: HashMap<String, &str> = HashMap::new();
+    let mut alike = results.iter().flatten().filter_map(|name| {
+        let known = seen.insert(name.to_lowercase(), name)?;
+        Some([known, name])
+    });
+    let Some([first, second]) = alike.next() else {
+        return;
+    };
+    let others = match alike.count() {
+        0 => String::new(),
+        more => format!(" ({} more)", words::count(more, "result")),
+    };
+    words::warning(&format!(
+        "{first} and {second} differ in case alone{others}: copied to Windows or macOS, one would replace the other"
+    ));
 }
 
 /// Refuses inputs whose results would have the same name: a worker has only some of the inputs, and

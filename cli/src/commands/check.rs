@@ -77,6 +77,8 @@ enum Fault {
     Unreadable(io::Error),
     /// This file has other bytes than those that it was made from.
     Stale(String),
+    /// The results of all clips that this input has now are there, and this one is of another clip.
+    RemovedClip(String),
 }
 
 impl fmt::Display for Fault {
@@ -85,6 +87,7 @@ impl fmt::Display for Fault {
             Self::Damaged => f.write_str("its bits have changed since it was written"),
             Self::Unreadable(error) => write!(f, "cannot be read: {error}"),
             Self::Stale(file) => write!(f, "its {file} has changed since it was written"),
+            Self::RemovedClip(input) => write!(f, "its input {input} has no such clip any more"),
         }
     }
 }
@@ -173,11 +176,16 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
     let total = words::count(entries.len(), "result");
     let mut missing: Vec<String> = Vec::new();
-    let unreadable = |(_, fault): &&(_, Fault)| matches!(fault, Fault::Unreadable(_));
-    let unreadable = faults.iter().filter(unreadable).count();
+    let count_of = |is_kind: fn(&Fault) -> bool| {
+        let faults = faults.iter().filter(|(_, fault)| is_kind(fault));
+        faults.count()
+    };
+    let unreadable = count_of(|fault| matches!(fault, Fault::Unreadable(_)));
+    let of_removed_clips = count_of(|fault| matches!(fault, Fault::RemovedClip(_)));
     for (count, verb) in [
-        (faults.len() - unreadable, "changed"),
+        (faults.len() - unreadable - of_removed_clips, "changed"),
         (unreadable, "missing or unreadable"),
+        (of_removed_clips, "of clips that are gone"),
     ] {
         if count > 0 {
             missing.push(format!("{count} of {total} {verb}"));
@@ -187,7 +195,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         let damaged = words::count(lines.damaged, "line");
         missing.push(format!("{damaged} of the manifest damaged"));
     }
-    let is_made_again = !faults.is_empty() || !lines.unfinished_inputs().pending.is_empty();
+    let is_made_again =
+        faults.len() > of_removed_clips || !lines.unfinished_inputs().pending.is_empty();
     missing.extend(unfinished(&lines));
     if !missing.is_empty()
         && let Some(progress) = &progress
@@ -203,7 +212,13 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
                 "`--resume` does not recognise a result whose line is damaged: `tumble eval … --overwrite` \
                  makes all results again"
             }
+            true if is_made_again && of_removed_clips > 0 => {
+                "`tumble eval … --resume --prune` makes them again, and removes those of clips that are gone"
+            }
             true if is_made_again => "`tumble eval … --resume` makes them again",
+            true if of_removed_clips > 0 => {
+                "`tumble eval … --resume --prune` removes those of clips that are gone"
+            }
             true => "`tumble eval … --resume` tries them again",
             false => {
                 "the first line of the manifest is damaged: `tumble eval … --overwrite` makes all results again"
@@ -259,7 +274,7 @@ fn unmerged(folder: &Path, progress: &ShardProgress) -> String {
 fn fault(folder: &Path, entry: &ManifestEntry, inputs: &InputHashes<'_>) -> Option<Fault> {
     let (bytes, sha256) = (entry.output_bytes, &entry.output_sha256);
     match digest::is_whole(folder, &entry.output, bytes, sha256) {
-        Ok(true) => inputs.changed(entry).map(Fault::Stale),
+        Ok(true) => inputs.fault(entry),
         Ok(false) => Some(Fault::Damaged),
         Err(error) => Some(Fault::Unreadable(error)),
     }
@@ -269,6 +284,8 @@ fn fault(folder: &Path, entry: &ManifestEntry, inputs: &InputHashes<'_>) -> Opti
 /// may be checked on another machine than that of their inputs.
 struct InputHashes<'a> {
     inputs: BTreeMap<&'a str, Option<String>>,
+    /// The results, of all clips of an input together, that were made from the input as it is now.
+    made: BTreeSet<&'a str>,
     /// Those of the files that options name.
     of_options: BTreeMap<&'a str, String>,
 }
@@ -286,31 +303,45 @@ impl<'a> InputHashes<'a> {
             || inputs.par_iter().map(|input| hash(input)).collect(),
             || inputs.iter().map(|input| hash(input)).collect(),
         );
+        let inputs: BTreeMap<&str, Option<String>> = hashes.into_iter().collect();
+        let mut counts: BTreeMap<(&str, usize), usize> = BTreeMap::new();
+        for entry in entries {
+            let now = inputs.get(&*entry.input).and_then(Option::as_ref);
+            if now.is_some() && now == entry.input_sha256.as_ref() {
+                *counts.entry(entry.whole()).or_default() += 1;
+            }
+        }
+        let made = counts.into_iter().filter(|((_, all), found)| found >= all);
         let files = entries.iter().flat_map(|entry| &entry.option_files);
         let paths: BTreeSet<&str> = files.map(|file| &*file.path).collect();
         let found = paths.into_iter().filter(|path| Path::new(path).exists());
         Self {
-            inputs: hashes.into_iter().collect(),
+            made: made.map(|((result, _), _)| result).collect(),
+            inputs,
             of_options: found.map(|path| (path, options::content(path))).collect(),
         }
     }
 
-    /// The input of a result, or the file of an option, if it is there and has other bytes than those that the result
-    /// was made from.
-    fn changed(&self, entry: &ManifestEntry) -> Option<String> {
+    /// The fault of a whole result whose input, or the file of an option, is there with other bytes than those that the
+    /// result was made from.
+    fn fault(&self, entry: &ManifestEntry) -> Option<Fault> {
         let now = self.inputs.get(&*entry.input).and_then(Option::as_ref);
         if now.is_some_and(|now| entry.input_sha256.as_ref() != Some(now)) {
-            return Some(format!(
-                "input {} (or a file that belongs to it)",
-                entry.input
-            ));
+            let input = &entry.input;
+            return Some(match self.made.contains(entry.whole().0) {
+                true => Fault::RemovedClip(input.clone()),
+                false => Fault::Stale(format!("input {input} (or a file that belongs to it)")),
+            });
         }
         let differs = |file: &&OptionFile| {
             let now = self.of_options.get(&*file.path);
             now.is_some_and(|now| *now != file.sha256)
         };
         let file = entry.option_files.iter().find(differs)?;
-        Some(format!("file {} of --{}", file.path, file.option))
+        Some(Fault::Stale(format!(
+            "file {} of --{}",
+            file.path, file.option
+        )))
     }
 
     /// Says how many results have no input any more, and how many inputs were not found to be compared.

@@ -1,5 +1,7 @@
 //! `tumble features`: numbers that people train on.
 
+use std::ops::RangeInclusive;
+
 use clap::Args;
 use clap::builder::TypedValueParser;
 use glam::DVec3;
@@ -150,6 +152,30 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     pipeline.finish()
 }
 
+/// Warns where HumanML3D's numbers would mean another thing than those of its models: other frames or another unit.
+fn warn_of_other_units(name: &str, rate: FrameRate, poses: &WorldFrames) {
+    /// Frames a second of HumanML3D.
+    const RATE: u64 = 20;
+    /// The distance between the joints of a person that are furthest apart along an axis, in metres.
+    const PERSON: RangeInclusive<f64> = 0.5..=3.0;
+    if FrameRate::new(RATE, 1).is_ok_and(|of_set| of_set != rate) {
+        words::warning(&format!(
+            "{name}: HumanML3D has {RATE} frames a second, and its numbers are steps from frame to frame; these are of \
+             {rate} frames a second (--fps {RATE})"
+        ));
+    }
+    let first = &poses.positions[..poses.names.len().min(poses.positions.len())];
+    let low = first.iter().copied().reduce(DVec3::min);
+    let high = first.iter().copied().reduce(DVec3::max);
+    let size = low.zip(high).map(|(low, high)| (high - low).max_element());
+    if let Some(size) = size.filter(|size| !PERSON.contains(size)) {
+        words::warning(&format!(
+            "{name}: HumanML3D is in metres, and the body is {} units tall; is it in another unit? (--scale)",
+            words::decimals(size)
+        ));
+    }
+}
+
 impl Arguments {
     fn make(
         &self,
@@ -186,6 +212,9 @@ impl Arguments {
             }),
             humanml3d_joints: joints_of_smpl(&clip, &poses.names),
         };
+        if self.sets.contains(&FeatureSet::Humanml3d) {
+            warn_of_other_units(name, rate, &poses);
+        }
         let failed =
             |error: &dyn std::fmt::Display| Failure::new(ALL_INPUTS, format!("{name}: {error}"));
         let arrays = feature_arrays(&poses, &request).map_err(|error| failed(&error))?;

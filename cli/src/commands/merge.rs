@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use serde::Serialize;
 
-use crate::batch::shards::merge::{MergeSummary, merge};
+use crate::batch::shards::merge::{MergeSummary, ResultLocation, merge};
 use crate::batch::shards::record::RefusedInput;
 use crate::messages::exit::{FailedInputs, Failure};
 use crate::messages::listing;
@@ -18,7 +18,8 @@ use crate::messages::words;
 `tumble eval LIBRARY -o OUT --shard I/N` writes OUT/manifest.d. When all shards are done, merging \
 writes OUT/manifest.jsonl and removes manifest.d. The file is the same as that of a single \
 `tumble eval LIBRARY -o OUT`, byte for byte if all processes used the same device. The exit code is 3 \
-if inputs failed. If shards are missing, nothing is changed and the exit code is 8.
+if inputs failed. If shards or results are missing, or results have another length than when they were \
+written, nothing is changed and the exit code is 8; `tumble check` compares all their bytes.
 
 Examples:
   tumble merge results
@@ -49,7 +50,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         shards,
         inputs,
         failed,
-    } = busy("merging", || merge(folder))?;
+    } = busy("merging", || merge(folder, ResultLocation::Beside))?;
     if arguments.json {
         listing::json(&MergeReport {
             output: folder.display().to_string(),

@@ -17,7 +17,7 @@ use crate::table::clips::clips;
 use crate::table::columns::{Column, ColumnNeed, ColumnNumbers, ColumnValues, Table};
 use crate::table::plan::{TablePlan, TimeSource};
 use crate::text::cell::cell_text;
-use crate::text::number;
+use crate::text::{last_number, number};
 use crate::warnings::Warnings;
 
 /// Reads a CSV file; `-` is standard input.
@@ -37,6 +37,12 @@ pub fn open_csv(path: &Path, options: &ReadOptions) -> Result<Loaded, Diagnostic
 pub fn read_csv(name: &str, bytes: Vec<u8>, options: &ReadOptions) -> Result<Loaded, Diagnostic> {
     let mut warnings = Warnings::new(name);
     let start = check_encoding(name, &bytes, &mut warnings)?;
+    if let Some((line, column)) = last_number::cut(&bytes[start..]) {
+        warnings.warn(Code::MaybeCut, || {
+            let location = Location::Text { line, column };
+            (Some(location), last_number::MESSAGE.to_owned())
+        });
+    }
     if options.map.is_none()
         && let Some(mut loaded) = dialect::text::read(name, &bytes[start..], options)?
     {

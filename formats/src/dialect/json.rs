@@ -408,7 +408,7 @@ fn episode(
     if !unnamed.is_empty() {
         warnings.warn(Code::UnnamedJoints, || {
             let message = format!(
-                "the file does not name the joints of {}; --robot FILE gives them the names of the robot's joints",
+                "the file does not name the joints of {}; they are called joint_0, joint_1 …",
                 unnamed.join(", ")
             );
             (None, message)

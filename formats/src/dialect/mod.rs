@@ -240,14 +240,9 @@ fn root_and_joints(
     let quaternions = KeyKind::Quaternion(rotation.1);
     plan.add(archive, root(archive, rotation.0, quaternions, 0)?)?;
     plan.add(archive, root(archive, position, KeyKind::Translation, 0)?)?;
-    let texts = |name| {
-        Ok(archive
-            .array_named(name)?
-            .and_then(|array| array.texts().ok()))
-    };
     let columns = (member(archive, joints)?, Layout::FrameMajor, 0);
-    let names: Option<Vec<String>> = match texts(JOINT_NAMES)? {
-        None => texts(DOF_NAMES)?,
+    let names = match archive.texts(JOINT_NAMES)? {
+        None => archive.texts(DOF_NAMES)?,
         found => found,
     };
     let mut robot = RobotArrays::of(dialect, names.is_some());
@@ -258,8 +253,7 @@ fn root_and_joints(
     if let (&[frames, bodies, _], &[of_frames, of_bodies, _]) = (&positions?[..], &rotations?[..])
         && (frames, bodies) == (of_frames, of_bodies)
     {
-        let names: Option<Vec<String>> = texts(BODY_NAMES)?;
-        robot.body_names = names
+        robot.body_names = (archive.texts(BODY_NAMES)?)
             .filter(|names| names.len() == bodies)
             .unwrap_or_default();
         (robot.bodies, robot.order) = (Some(members), rotation.1);

@@ -62,10 +62,7 @@ fn clips_of(archive: &Archive, options: &ReadOptions) -> Result<Loaded, Diagnost
     let starts = list("length_starts")?;
     let counts = list("motion_num_frames")?;
     let steps = list("motion_dt")?;
-    let names = archive.array_named("motion_files")?;
-    let names = names
-        .and_then(|array| array.texts().ok())
-        .unwrap_or_default();
+    let names = archive.texts("motion_files")?.unwrap_or_default();
     if counts.len() != starts.len() || steps.len() != starts.len() {
         let member = super::member(archive, "length_starts")?;
         let message = format!(

@@ -134,8 +134,8 @@ impl WrittenDialect {
             );
             return Err(refuse(message).into());
         }
-        let slides = motion.tree_joints().into_iter();
-        let slide = slides.filter(|joint| joint.kind == JointKind::Slide).next();
+        let mut joints = motion.tree_joints().into_iter();
+        let slide = joints.find(|joint| joint.kind == JointKind::Slide);
         if let Some(slide) = slide.filter(|_| self.has_degrees) {
             let message = format!(
                 "`{}` slides, and {} has an angle in degrees for each joint; {OTHER_FILES}",

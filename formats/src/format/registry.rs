@@ -5,6 +5,7 @@ use std::path::Path;
 use crate::FORMATS;
 use crate::diagnostic::Diagnostic;
 use crate::format::{Format, FormatOption, Loaded, ReadOptions};
+use crate::pickle;
 use crate::source::{START, Source};
 
 impl Format {
@@ -34,6 +35,16 @@ impl Format {
     #[must_use]
     pub fn of(path: &Path) -> Option<&'static Self> {
         Self::named(path.extension()?.to_str()?)
+    }
+
+    /// The format of an input with the extension of this path. joblib adds `.gz` to the names of pickles, and these are
+    /// read compressed too.
+    #[must_use]
+    pub fn of_input(path: &Path) -> Option<&'static Self> {
+        if !path.extension()?.eq_ignore_ascii_case("gz") {
+            return Self::of(path);
+        }
+        Self::of(Path::new(path.file_stem()?)).filter(|format| format.name == pickle::NAME)
     }
 
     /// The formats that can be written: first those that store results in parts, then those that store clips only.
@@ -67,7 +78,7 @@ impl Format {
             all.find(|format| format.numbers_in_line == width)
         };
         probed
-            .or_else(|| Self::of(path))
+            .or_else(|| Self::of_input(path))
             .or_else(by_numbers)
             .unwrap_or(FORMATS[0])
     }
@@ -162,6 +173,14 @@ mod tests {
         ] {
             let found = Format::detect(Path::new("poses.txt"), text.as_bytes());
             assert_eq!(found.name, name, "{text}");
+        }
+        let gzip = b"\x1f\x8b\x08";
+        for (file, name) in [
+            ("a.joblib.gz", "pickle"),
+            ("a.pkl.GZ", "pickle"),
+            ("a.bvh.gz", "dat"),
+        ] {
+            assert_eq!(Format::detect(Path::new(file), gzip).name, name, "{file}");
         }
         let named = Format::detect(Path::new("a.dat"), b"1 0 0 0 0 0 0 1\n");
         assert_eq!(named.name, "dat");

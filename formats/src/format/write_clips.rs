@@ -168,6 +168,9 @@ fn no_room(
     // If the format has no start, another warning reports that the times are shifted.
     let has_start = format.supports(Feature::Start);
     let missing = missing.filter(|feature| has_start || *feature != Feature::Nanoseconds);
+    // Limits are those of scalars.
+    let has_scalars = format.supports(Feature::Scalars);
+    let missing = missing.filter(|feature| has_scalars || *feature != Feature::Limits);
     let left_out: Vec<&str> = missing
         .filter_map(|feature| {
             let mut each = clips.iter();
@@ -217,6 +220,10 @@ fn loss(
             (sampled.scales.iter().any(is_scaled), "the scales")
         }
         Feature::Scalars => (clip.set.scalar_count() > 0, "the scalars"),
+        Feature::Limits => (
+            clip.scalars.iter().any(|scalar| scalar.limits.is_some()),
+            "the limits of the joints",
+        ),
         Feature::Steps => (
             clip.channels
                 .iter()

@@ -59,6 +59,9 @@ impl ScalarKind {
     }
 }
 
+/// Angles from this magnitude on, in radians, are stored in steps of 6e-5 rad or more.
+const COARSE: f32 = 512.0;
+
 impl Scalar {
     /// A scalar of a kind; contacts are steps.
     #[must_use]
@@ -129,6 +132,33 @@ impl Motion {
             keys.name,
             keys.times[*key],
             keys.times[key + 1]
+        ))
+    }
+
+    /// The angle whose keys are furthest from 0, if f32 stores them in coarse steps: many turns of a wheel.
+    pub(crate) fn coarse_angle(&self) -> Option<String> {
+        let angles = self
+            .scalar_keys()
+            .enumerate()
+            .filter(|(index, _)| self.scalar(*index).kind == ScalarKind::Angle);
+        let largest = angles.map(|(index, keys)| {
+            let magnitudes = keys.keys.iter().map(|key| key.abs());
+            (magnitudes.fold(0.0, f32::max), index, keys.name)
+        });
+        let all: Vec<(f32, usize, &str)> = largest.filter(|angle| angle.0 >= COARSE).collect();
+        let (largest, index, name) = all.iter().copied().max_by(|a, b| a.0.total_cmp(&b.0))?;
+        let side = match self.scalar(index).origin {
+            0.0 => "",
+            _ => " on each side of its middle",
+        };
+        let step = largest.next_up() - largest;
+        let others = match all.len() {
+            1 => String::new(),
+            count => format!(" (and {} more joints)", count - 1),
+        };
+        Some(format!(
+            "`{name}`{others} reaches {largest:.0} rad{side}: keys are f32, whose steps are {step:.1e} rad there; shorter \
+             files have finer steps"
         ))
     }
 

@@ -18,6 +18,7 @@ use crate::budget::Budget;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::limits::Limits;
 use crate::npz::array::Array;
+use crate::warnings::listed;
 
 /// An open archive in memory.
 pub(crate) struct Archive {
@@ -34,6 +35,8 @@ pub(crate) struct Member {
     pub(crate) path: String,
     /// The name of its array: the path without `.npy`.
     pub(crate) name: String,
+    /// Whether it is called as an array is: `x.npy` in an archive.
+    is_array: bool,
     /// The header of the array, or why there is none.
     pub(crate) header: Result<ArrayHeader, String>,
     pub(crate) is_deflated: bool,
@@ -54,7 +57,14 @@ impl Archive {
         let limit = limits.file;
         let refuse = |code, message: String| Diagnostic::new(file, code, message);
         let broken = |error: ZipError| {
-            let message = format!("the ZIP archive cannot be read: {error}; save the file again");
+            let message = match (bytes.starts_with(b"PK"), has_directory(&bytes)) {
+                (false, false) => "is no ZIP archive, as NPZ files are; save it by numpy.savez".to_owned(),
+                (true, false) => {
+                    "the directory at the end of the ZIP archive is missing: the file is cut; copy it again"
+                        .to_owned()
+                }
+                _ => format!("the ZIP archive cannot be read: {error}; save the file again"),
+            };
             refuse(Code::Archive, message)
         };
         let mut zip = ZipArchive::new(Cursor::new(&*bytes)).map_err(broken)?;
@@ -111,6 +121,7 @@ impl Archive {
             let array = path.strip_suffix(".npy");
             let mut member = Member {
                 name: array.unwrap_or(&path).to_owned(),
+                is_array: array.is_some(),
                 header: Err("it is no NPY array".to_owned()),
                 is_deflated,
                 data: start..end,
@@ -118,7 +129,7 @@ impl Archive {
                 checksum: Some(entry.crc32()),
                 path,
             };
-            if member.path.ends_with(".npy") {
+            if member.is_array {
                 member.header = ArrayHeader::parse(&member.start(&bytes));
             }
             members.push(member);
@@ -138,6 +149,7 @@ impl Archive {
         let member = Member {
             path: String::new(),
             name: ONLY_ARRAY.to_owned(),
+            is_array: true,
             header: ArrayHeader::parse(&bytes),
             is_deflated: false,
             data: 0..bytes.len(),
@@ -205,7 +217,7 @@ impl Archive {
     /// The index of the member with this array name.
     pub(crate) fn find(&self, name: &str) -> Option<usize> {
         let mut members = self.members.iter();
-        members.position(|member| member.name == name && member.path != name)
+        members.position(|member| member.name == name && member.is_array)
     }
 
     /// The shape of the array with this name.
@@ -267,6 +279,21 @@ impl Archive {
         self.find(name).map(|member| self.array(member)).transpose()
     }
 
+    /// The texts of the array with this name, if there is one.
+    ///
+    /// # Errors
+    /// When it holds anything else: names that cannot be read are not passed over.
+    pub(crate) fn texts(&self, name: &str) -> Result<Option<Vec<String>>, Diagnostic> {
+        let Some(member) = self.find(name) else {
+            return Ok(None);
+        };
+        let texts = self.array(member)?.texts();
+        texts.map(Some).map_err(|why| {
+            let message = format!("{why}; save its texts as such (dtype=str), or leave it out");
+            self.refuse(member, Code::ElementType, message)
+        })
+    }
+
     /// The bytes of a member.
     pub(crate) fn unpack(&self, member: usize) -> Result<Cow<'_, [u8]>, Diagnostic> {
         let Member { size, checksum, .. } = self.members[member];
@@ -311,6 +338,16 @@ impl Archive {
         Ok(bytes)
     }
 
+    /// The arrays whose headers cannot be read, each with the reason, for messages.
+    pub(crate) fn unreadable(&self) -> Option<String> {
+        let unreadable = self.members.iter().filter(|member| member.is_unreadable());
+        let unreadable = unreadable.filter_map(|member| {
+            let why = member.header.as_ref().err()?;
+            Some(format!("`{}` ({why})", member.name))
+        });
+        listed(unreadable.collect())
+    }
+
     /// All arrays with their shapes, for messages.
     pub(crate) fn listing(&self) -> String {
         const MAX_LISTED: usize = 24;
@@ -341,6 +378,7 @@ impl Member {
         Self {
             path: location,
             name,
+            is_array: true,
             header: Ok(header),
             is_deflated: false,
             size: data.len() as u64,
@@ -352,6 +390,11 @@ impl Member {
     /// Where the bytes are in the file; `None` if they are packed.
     pub(crate) fn stored(&self) -> Option<Range<usize>> {
         (!self.is_deflated).then(|| self.data.clone())
+    }
+
+    /// Whether it is called as an array is, but has no header of one.
+    pub(crate) fn is_unreadable(&self) -> bool {
+        self.is_array && self.header.is_err()
     }
 
     /// Where the pickle of an array of objects begins in the member; `None` for others.
@@ -373,6 +416,14 @@ impl Member {
         let _ = unpacked.read_to_end(&mut start);
         Cow::Owned(start)
     }
+}
+
+/// Whether an archive has the record that ends its directory; a comment of up to 65 535 bytes may follow it.
+fn has_directory(bytes: &[u8]) -> bool {
+    const SIGNATURE: &[u8] = b"PK\x05\x06";
+    const LONGEST: usize = 22 + u16::MAX as usize;
+    let end = &bytes[bytes.len().saturating_sub(LONGEST)..];
+    end.windows(SIGNATURE.len()).any(|part| part == SIGNATURE)
 }
 
 /// Refuses members that share bytes: a few bytes could otherwise unpack to any number.

@@ -137,6 +137,9 @@ pub(crate) fn read(
     if let Some(message) = motion.angle_jump() {
         warnings.warn(Code::AngleJumps, || (None, message));
     }
+    if let Some(message) = motion.coarse_angle() {
+        warnings.warn(Code::CoarseAngles, || (None, message));
+    }
     motion.robot = recorded_robot(archive, plan, &frames)?;
     if !plan.parents.is_empty() || !plan.rest.is_empty() {
         for track in 0..plan.tracks {

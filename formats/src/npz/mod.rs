@@ -61,6 +61,7 @@ pub static FORMAT: Format = Format {
         Feature::Translations,
         Feature::Scales,
         Feature::Scalars,
+        Feature::Limits,
         Feature::Steps,
         Feature::Lines,
         Feature::Curves,
@@ -176,9 +177,12 @@ fn read_known(
             );
             return Diagnostic::new(&archive.file, Code::BodyAlone, message);
         }
+        let unreadable = archive.unreadable().map_or(String::new(), |arrays| {
+            format!("; the headers of these cannot be read: {arrays}")
+        });
         let message = format!(
             "no array has a known name (poses, rotations, body_rotations); say what they \
-             are with --map rotations=ARRAY:wxyz,time=ARRAY; there are {}",
+             are with --map rotations=ARRAY:wxyz,time=ARRAY; there are {}{unreadable}",
             archive.listing()
         );
         Diagnostic::new(&archive.file, Code::UnknownArrays, message)

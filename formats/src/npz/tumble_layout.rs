@@ -98,11 +98,8 @@ pub(crate) fn plan(
         plan.is_world = read_numbers(archive, member)? == [1.0];
     }
     for (name, text) in [("name", &mut plan.name), (NO_WORLD, &mut plan.no_world)] {
-        if let Some(array) = archive.array_named(name)? {
-            *text = array
-                .texts()
-                .ok()
-                .and_then(|texts| texts.into_iter().next());
+        if let Some(texts) = archive.texts(name)? {
+            *text = texts.into_iter().next();
         }
     }
     Ok(Some(plan))
@@ -127,8 +124,7 @@ fn texts(
     let Some(member) = archive.find(name) else {
         return Ok(None);
     };
-    let texts = archive.array(member)?.texts();
-    let texts = texts.map_err(|why| archive.refuse(member, Code::ElementType, why))?;
+    let texts = archive.texts(name)?.unwrap_or_default();
     if texts.len() != each * plan.tracks {
         let (found, tracks) = (texts.len(), plan.tracks);
         let message =
@@ -147,23 +143,17 @@ fn read_scalars(
     let Some(member) = archive.find(SCALARS) else {
         return Ok(());
     };
-    let texts = |name| match archive.array_named(name)? {
-        Some(array) => Ok(Some(array.texts().map_err(|why| {
-            Diagnostic::new(&archive.file, Code::ElementType, why).inside(name)
-        })?)),
-        None => Ok(None),
-    };
-    let (names, kinds) = (
-        texts(SCALAR_NAMES)?,
-        texts(SCALAR_KINDS)?.unwrap_or_default(),
-    );
+    let names = archive.texts(SCALAR_NAMES)?;
+    let kinds = archive.texts(SCALAR_KINDS)?.unwrap_or_default();
     let kind = |index: usize| {
         let kind = kinds.get(index).and_then(|kind| kind.parse().ok());
         kind.unwrap_or_default()
     };
     let rows = (member, Layout::TrackMajor, 0);
     plan.add_scalars(archive, rows, names, kind, warnings)?;
-    if let (Some(samplers), Some(array)) = (texts(SCALAR_SAMPLERS)?, plan.scalars.last_mut()) {
+    if let (Some(samplers), Some(array)) =
+        (archive.texts(SCALAR_SAMPLERS)?, plan.scalars.last_mut())
+    {
         for ((_, scalar), text) in array.scalars.iter_mut().zip(&samplers) {
             scalar.interpolation = match text.as_str() {
                 "STEP" => Some(ChannelInterpolation::Step),

@@ -42,8 +42,7 @@ pub(crate) fn plan(
     plan.read_names(archive, "body_names")?;
     let members = position_member.map(|member| [member, rotation_member]);
     if let Some(member) = archive.find("dof_positions") {
-        let names = archive.array_named("dof_names")?;
-        let names = names.and_then(|array| array.texts().ok());
+        let names = archive.texts("dof_names")?;
         let columns = (member, Layout::FrameMajor, 0);
         let is_of_bodies =
             |&member: &usize| (archive.header(member)).is_ok_and(|header| header.shape.len() == 3);

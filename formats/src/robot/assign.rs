@@ -1,7 +1,7 @@
 //! The joints of a robot in the clips of a file: the root and the scalars get the names of the robot's joints. Files that
 //! name no joints have them in an order, which follows from the poses of bodies that the file has beside them.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap, HashSet};
 use std::f64::consts::TAU;
 
 use glam::{DQuat, DVec3};
@@ -69,9 +69,12 @@ impl Robot {
         }
         loaded.refused.append(&mut refused);
         // The robot names the joints, so the warning about unnamed joints is removed.
-        loaded
-            .warnings
-            .retain(|warning| !matches!(warning.code, Code::UnnamedJoints | Code::AngleJumps));
+        loaded.warnings.retain(|warning| {
+            !matches!(
+                warning.code,
+                Code::UnnamedJoints | Code::AngleJumps | Code::CoarseAngles
+            )
+        });
         loaded.warnings.extend(warnings.into_list());
         loaded.adjustment = loaded.adjustment.or(Some(Adjustment::Robot));
         Ok(())
@@ -86,7 +89,8 @@ impl Robot {
     ) -> Result<Motion, Diagnostic> {
         let refuse = |message: String| Diagnostic::new(file, Code::JointsDoNotFit, message);
         let tree = &self.tree;
-        let scalars = valued_scalars(tree, clip, warnings);
+        let scalars = scalars_of_robot(tree, clip, warnings, &refuse)?;
+        let scalars = valued_scalars(tree, clip, scalars, warnings);
         let candidate = choose(tree, clip, &scalars, order, warnings, &refuse)?;
         let mut motion = Motion {
             set: TrackSet::new(),
@@ -158,8 +162,77 @@ impl Robot {
                 )
             });
         }
+        if let Some(message) = motion.coarse_angle() {
+            warnings.warn(Code::CoarseAngles, || (None, message));
+        }
         Ok(motion)
     }
+}
+
+/// The scalars that are of the robot, with the names of its joints. If the file has its scalars in groups, such as
+/// `observation.state.left_knee` of `LeRobot`, these are the scalars of the groups with the robot's names.
+fn scalars_of_robot<'a>(
+    tree: &Tree,
+    clip: &'a Motion,
+    warnings: &mut Warnings,
+    refuse: &impl Fn(String) -> Diagnostic,
+) -> Result<Vec<(usize, ScalarKeys<'a>)>, Diagnostic> {
+    let joints = tree.bodies().iter().flat_map(|body| &body.joints);
+    let joints: HashSet<&str> = joints.map(|joint| &*joint.name).collect();
+    let all: Vec<(usize, ScalarKeys<'a>)> = clip.scalar_keys().enumerate().collect();
+    if all.iter().any(|(_, keys)| joints.contains(keys.name)) {
+        return Ok(all);
+    }
+    // The joints of each group, by what stands before their names.
+    let mut groups: BTreeMap<&str, HashSet<&str>> = BTreeMap::new();
+    for (_, keys) in &all {
+        let mut points = keys.name.match_indices('.');
+        let joint_at = points.find(|(point, _)| joints.contains(&keys.name[point + 1..]));
+        if let Some((point, _)) = joint_at {
+            let (group, joint) = keys.name.split_at(point + 1);
+            groups.entry(group).or_default().insert(joint);
+        }
+    }
+    let is_unambiguous = |groups: &BTreeMap<&str, HashSet<&str>>| {
+        let mut all = HashSet::new();
+        groups.values().flatten().all(|joint| all.insert(*joint))
+    };
+    if !is_unambiguous(&groups) {
+        // The actions are what was commanded, and the states what the robot did.
+        groups.retain(|group, _| !group.starts_with("action"));
+    }
+    if !is_unambiguous(&groups) {
+        let groups: Vec<&str> = groups.into_keys().collect();
+        return Err(refuse(format!(
+            "the file has the robot's joints more than once, as `{}…`; choose one group (--map)",
+            groups.join("…`, `")
+        )));
+    }
+    let group_of =
+        |keys: &ScalarKeys<'a>| groups.keys().find(|group| keys.name.starts_with(**group));
+    let (of_robot, others): (Vec<_>, Vec<_>) =
+        (all.into_iter()).partition(|(_, keys)| groups.is_empty() || group_of(keys).is_some());
+    if let Some(names) = listed(
+        others
+            .iter()
+            .map(|(_, keys)| format!("`{}`", keys.name))
+            .collect(),
+    ) {
+        warnings.warn_of(others.len(), Code::OtherScalars, || {
+            let groups: Vec<&str> = groups.keys().copied().collect();
+            let message = format!(
+                "the joints of the robot are those called `{}…`; these scalars are left out: {names}",
+                groups.join("…`, `")
+            );
+            (None, message)
+        });
+    }
+    let named = of_robot.into_iter().map(|(index, mut keys)| {
+        let before = group_of(&keys).map_or(0, |group| group.len());
+        keys.name = &keys.name[before..];
+        (index, keys)
+    });
+    Ok(named.collect())
 }
 
 /// The scalars of joints with values of their own, and their names. Joints that follow others (`mimic`) are computed; a
@@ -167,6 +240,7 @@ impl Robot {
 fn valued_scalars<'a>(
     tree: &Tree,
     clip: &'a Motion,
+    scalars: Vec<(usize, ScalarKeys<'a>)>,
     warnings: &mut Warnings,
 ) -> Vec<(usize, ScalarKeys<'a>)> {
     let joints = tree.bodies().iter().flat_map(|body| &body.joints);
@@ -181,16 +255,15 @@ fn valued_scalars<'a>(
             .collect::<Vec<f64>>()
     };
     let mut valued = Vec::new();
-    for (index, keys) in clip.scalar_keys().enumerate() {
+    let find = |name: &str| scalars.iter().find(|(_, keys)| keys.name == name);
+    for &(index, keys) in &scalars {
         let Some(mimic) = mimics.get(keys.name) else {
             valued.push((index, keys));
             continue;
         };
-        let source = clip.set.scalar_named(&mimic.joint);
-        let source = source.and_then(|source| Some((source, clip.set.scalar(source)?)));
-        let source = source.filter(|(_, source)| source.times == keys.times);
+        let source = find(&mimic.joint).filter(|(_, source)| source.times == keys.times);
         let largest = source.map(|(source, source_keys)| {
-            let computed = values(source, &source_keys).into_iter();
+            let computed = values(*source, source_keys).into_iter();
             let computed = computed.map(|value| mimic.multiplier * value + mimic.offset);
             let apart = computed
                 .zip(values(index, &keys))
@@ -505,16 +578,18 @@ fn joints_by_name(
         if let Some(repeated) = repeated {
             return refuse(format!("the file names the joint `{repeated}` twice"));
         }
-        let unknown: Vec<&str> = names
-            .iter()
-            .copied()
-            .filter(|name| position(name).is_none())
-            .collect();
+        let unknown = names.iter().filter(|name| position(name).is_none());
+        let unknown = unknown.map(|name| format!("`{name}`"));
+        let all = |names: &[&str]| {
+            let names = names.iter().map(|&name| name.to_owned());
+            listed(names.collect()).unwrap_or_default()
+        };
         refuse(format!(
-            "the robot has no joint `{}`; the file has {}, and the robot {}",
-            unknown.join("`, `"),
-            names.join(", "),
-            joints.join(", ")
+            "the robot has no joint {}; the file has {}, and the robot {}; for tables and arrays, \
+             --map JOINT=COLUMN:scalar:angle names them",
+            listed(unknown.collect()).unwrap_or_default(),
+            all(names),
+            all(&joints)
         ))
     })
 }

@@ -333,6 +333,13 @@ impl<'a> Documents<'a> {
         for token in text.split_ascii_whitespace() {
             match token.parse::<f64>() {
                 Ok(number) if number.is_finite() => numbers.push(number),
+                _ if token.contains("${") => {
+                    let message = format!(
+                        "`{name}` has `{token}`, an expression of xacro, which is not computed; write the URDF by \
+                         `xacro FILE > robot.urdf` first"
+                    );
+                    return Err(self.refuse(element, Code::RobotElement, message));
+                }
                 _ => {
                     let message = format!("`{name}` has `{token}`, which is not a finite number");
                     return Err(self.refuse(element, Code::Number, message));

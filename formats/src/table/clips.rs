@@ -274,6 +274,9 @@ impl TableClip<'_> {
         if let Some(message) = motion.angle_jump() {
             warnings.warn(Code::AngleJumps, || (None, message));
         }
+        if let Some(message) = motion.coarse_angle() {
+            warnings.warn(Code::CoarseAngles, || (None, message));
+        }
         Ok(())
     }
 

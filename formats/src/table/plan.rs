@@ -118,8 +118,8 @@ impl ScalarColumn {
             warnings.warn(Code::UnnamedJoints, || {
                 let name = &self.name;
                 let message = format!(
-                    "the {length} numbers of `{name}` have no names; they are called {name}.0, {name}.1 …; --robot FILE gives \
-                     them the names of a robot's joints"
+                    "the {length} numbers of `{name}` have no names; they are called {name}.0, {name}.1 …; --map names \
+                     them, as in --map 'left_knee={name}[0]:scalar:angle'"
                 );
                 (None, message)
             });

@@ -6,6 +6,7 @@ use crate::budget::Budget;
 use crate::diagnostic::{Code, Diagnostic, Location};
 use crate::foreign;
 use crate::limits::Limits;
+use crate::text::last_number::{self, LastNumbers};
 
 /// The lines of one input, with their numbers; warnings about them are collected in `warnings`.
 pub(crate) struct Lines<R> {
@@ -22,6 +23,7 @@ pub(crate) struct Lines<R> {
     lf: u64,
     /// Whether the line in `buffer` has a line end.
     pub(crate) ended: bool,
+    last_numbers: LastNumbers,
     pub(crate) warnings: Vec<Diagnostic>,
     /// [`Limits::memory`]; `None` if there is no such limit.
     budget: Option<Budget>,
@@ -77,6 +79,7 @@ impl<R: BufRead> Lines<R> {
             crlf: 0,
             lf: 0,
             ended: true,
+            last_numbers: LastNumbers::default(),
             warnings: Vec::new(),
             // Without a limit, the length of text limits the memory for its numbers.
             budget: limits.memory.map(|_| Budget::of(0, limits)),
@@ -116,6 +119,14 @@ impl<R: BufRead> Lines<R> {
         }
         self.strip_line_end();
         self.check_characters()?;
+        match self.ended {
+            true => self.last_numbers.add(&self.buffer),
+            false => {
+                if let Some(column) = self.last_numbers.cut(&self.buffer) {
+                    self.warn(column, Code::MaybeCut, last_number::MESSAGE);
+                }
+            }
+        }
         if let Some(budget) = &self.budget {
             let is_between = |byte: &u8| byte.is_ascii_whitespace() || *byte == b',';
             let words = self.buffer.split(is_between);

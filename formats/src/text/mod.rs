@@ -2,5 +2,6 @@
 
 pub(crate) mod blocks;
 pub(crate) mod cell;
+pub(crate) mod last_number;
 pub(crate) mod lines;
 pub(crate) mod number;

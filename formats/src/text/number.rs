@@ -12,8 +12,6 @@ pub(crate) struct Number {
     pub(crate) value: f64,
     /// Whether it is not 0 but too small for f32.
     pub(crate) vanished: bool,
-    /// How many digits the text has.
-    pub(crate) digits: usize,
 }
 
 /// Why a token is not a number: code and message.
@@ -36,7 +34,6 @@ pub(crate) fn parse(token: &str) -> Result<Number, Refusal> {
         return Err((Code::TokenTooLong, message));
     }
     let decimal = decimal(token).ok_or_else(|| refuse(token))?;
-    let DecimalParts { digits, zero, .. } = decimal;
     if let Some(value) = decimal.exact_quotient() {
         let value = if token.starts_with('-') {
             -value
@@ -46,7 +43,6 @@ pub(crate) fn parse(token: &str) -> Result<Number, Refusal> {
         return Ok(Number {
             value,
             vanished: false, // 22 decimals are far from the end of f32
-            digits,
         });
     }
     // Rust's parser takes exactly this grammar, correctly rounded.
@@ -56,20 +52,14 @@ pub(crate) fn parse(token: &str) -> Result<Number, Refusal> {
             format!("`{token}` is too large; the largest f32 is 3.4e38, check the exponent");
         return Err((Code::TooLarge, message));
     }
-    let vanished = value.abs() < f64::from(f32::MIN_POSITIVE) && !zero;
+    let vanished = value.abs() < f64::from(f32::MIN_POSITIVE) && !decimal.zero;
     let value = if vanished { 0.0 } else { value };
-    Ok(Number {
-        value,
-        vanished,
-        digits,
-    })
+    Ok(Number { value, vanished })
 }
 
 /// The parts of a decimal number.
 #[derive(Clone, Copy)]
 struct DecimalParts {
-    /// Number of digits, including those of the exponent.
-    digits: usize,
     /// Whether the mantissa is 0.
     zero: bool,
     /// The digits of the mantissa as an integer, if there are 19 or fewer.
@@ -130,12 +120,10 @@ fn decimal(token: &str) -> Option<DecimalParts> {
         if exponent.is_empty() || !exponent.iter().all(u8::is_ascii_digit) {
             return None;
         }
-        digits += exponent.len();
         at = bytes.len();
         is_long = true;
     }
     (at == bytes.len()).then_some(DecimalParts {
-        digits,
         zero,
         mantissa,
         decimals,

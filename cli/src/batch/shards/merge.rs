@@ -5,7 +5,7 @@ use std::io::{BufRead, BufReader, Read, Write};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use tumble_formats::beneath::parent_beneath;
+use tumble_formats::beneath::{open_beneath, parent_beneath};
 use tumble_formats::folder::Folder;
 use tumble_formats::output::{Output, remove_abandoned, remove_marked};
 
@@ -32,6 +32,22 @@ pub(crate) struct MergeSummary {
     pub(crate) failed: Vec<RefusedInput>,
 }
 
+/// Where the results are that a manifest lists.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum ResultLocation {
+    /// In the directory of the manifest.
+    Beside,
+    /// In an object store, of which the directory has the shards' records alone.
+    Store,
+}
+
+/// The results that are not in their directory as they were written.
+#[derive(Default)]
+struct FaultyResults {
+    count: usize,
+    first: Option<String>,
+}
+
 /// How many shards of a directory are done.
 pub(crate) struct ShardProgress {
     done: usize,
@@ -45,6 +61,39 @@ struct LinePosition {
     output: String,
     file: usize,
     at: Range<usize>,
+}
+
+impl FaultyResults {
+    /// Compares the length of a result with that in its entry.
+    fn look_at(&mut self, folder: &Path, entry: &ManifestEntry) {
+        let file = open_beneath(folder, Path::new(&entry.output));
+        let length = file.and_then(|file| Ok(file.metadata()?.len()));
+        let fault = match length {
+            Ok(length) if length == entry.output_bytes => return,
+            Ok(length) => format!(
+                "has {length} bytes, and was written with {}",
+                entry.output_bytes
+            ),
+            Err(error) => format!("cannot be read: {error}"),
+        };
+        self.count += 1;
+        self.first
+            .get_or_insert_with(|| format!("{} {fault}", entry.output));
+    }
+
+    fn outcome(&self, folder: &Path, all: usize) -> Result<(), Failure> {
+        let Some(first) = &self.first else {
+            return Ok(());
+        };
+        let message = format!(
+            "{}: {} of {} missing or damaged (the first: {first}), so nothing is merged; the command that made \
+             the shards makes them again with --resume",
+            folder.display(),
+            self.count,
+            words::count(all, "result"),
+        );
+        Err(Failure::new(DIFFERENCE, message))
+    }
 }
 
 impl ShardProgress {
@@ -95,8 +144,9 @@ fn read(
 }
 
 /// Writes the manifest of a directory whose shards are all done, and removes `manifest.d` and the
-/// temporary files of lost workers.
-pub(crate) fn merge(folder: &Path) -> Result<MergeSummary, Failure> {
+/// temporary files of lost workers. If results are missing, or have another length than when they were written, nothing
+/// is changed.
+pub(crate) fn merge(folder: &Path, location: ResultLocation) -> Result<MergeSummary, Failure> {
     let shown = folder.display();
     let Some(recorded) = RecordedPlan::read(folder)? else {
         let message =
@@ -136,7 +186,7 @@ pub(crate) fn merge(folder: &Path) -> Result<MergeSummary, Failure> {
     inputs.extend(without_results.map(|entry| (entry.key(), entry)));
     let lines = one_each(lines)?;
     if !lines.is_empty() || !inputs.is_empty() {
-        write(&opened, &path, &lines, &inputs)?;
+        write(&opened, &path, (&lines, location), &inputs)?;
     }
     let parents: BTreeSet<PathBuf> = (lines.iter())
         .filter_map(|line| parent_beneath(folder, Path::new(&line.output)).ok())
@@ -240,7 +290,7 @@ fn one_each(mut lines: Vec<LinePosition>) -> Result<Vec<LinePosition>, Failure> 
 fn write(
     opened: &Folder,
     path: &Path,
-    lines: &[LinePosition],
+    (lines, location): (&[LinePosition], ResultLocation),
     inputs: &InputEntries,
 ) -> Result<(), Failure> {
     let failed = |error| Failure::writing(&path.display().to_string(), &error);
@@ -253,6 +303,7 @@ fn write(
         false => None,
     };
     let (mut at, mut one) = (0, Vec::new());
+    let mut faulty = FaultyResults::default();
     for line in lines {
         let text = match (line.file, &mut before) {
             (0, Some(before)) => {
@@ -276,17 +327,20 @@ fn write(
             }
         };
         // The file may have been replaced meanwhile by one with the same entries at other offsets.
-        let is_whole =
-            ManifestEntry::of_line(text).is_some_and(|entry| entry.output == line.output);
-        if !is_whole {
+        let entry = ManifestEntry::of_line(text).filter(|entry| entry.output == line.output);
+        let Some(entry) = entry else {
             let message = format!(
                 "{}: changed while it was merged; try again",
                 folder.display()
             );
             return Err(Failure::new(DIFFERENCE, message));
+        };
+        if location == ResultLocation::Beside && line.file > 0 {
+            faulty.look_at(folder, &entry);
         }
         output.write_all(text).map_err(failed)?;
     }
+    faulty.outcome(folder, lines.len())?;
     for entry in inputs.values() {
         output.write_all(entry.line().as_bytes()).map_err(failed)?;
     }

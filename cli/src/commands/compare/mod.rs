@@ -1,5 +1,6 @@
 //! `tumble compare`: how far two motions, or two results, are apart.
 
+mod folders;
 mod table;
 mod text;
 
@@ -42,6 +43,8 @@ With --ape, --rpe or --align, the second input is an estimate of the trajectory 
 compared as by the program evo, after the alignment by --align, at the times of the input with fewer \
 poses. The other is interpolated there by lines and arcs; --associate nearest:0.01 takes its nearest \
 pose within 0.01 s instead, as evo does. --tolerance and --distance are then limits of the absolute errors.
+Of two directories, the files with the same relative names are compared: a line for each pair that differs, and a \
+summary. With --tolerance or --distance the exit code is 8 if a pair exceeds it, or if a file is in only one.
 
 Examples:
   tumble compare walk.bvh walk.glb
@@ -50,10 +53,12 @@ Examples:
   tumble compare walk.bvh walk.glb --csv > joints.csv
   tumble compare one.npy other.npy --tolerance 0
   tumble compare a.dat b.dat --fps 240 --json
+  tumble compare before/ after/ --tolerance 0.01deg
   tumble compare truth.tum estimate.tum --align sim3 --ape --rpe 1m
-  tumble compare truth.tum estimate.tum --align se3 --ape --associate nearest:0.01")]
+  tumble compare truth.tum estimate.tum --align se3 --ape --associate nearest:0.01
+  tumble compare truth.tum estimate.tum --ape --time-offset -0.25")]
 pub(crate) struct Arguments {
-    /// Two keyframe files, or two results of `tumble eval`
+    /// Two keyframe files, two results of `tumble eval`, or two directories of them
     #[command(flatten)]
     inputs: Inputs,
     /// Frames per second: compare at these frames [default: at the keys, and halfway between them]
@@ -65,6 +70,9 @@ pub(crate) struct Arguments {
     /// Where to end, seconds [default: the last time that both have]
     #[arg(long, value_name = "SECONDS", value_parser = finite_seconds, allow_hyphen_values = true)]
     end: Option<f64>,
+    /// Seconds to add to the times of the second input, whose clock is another
+    #[arg(long, value_name = "SECONDS", value_parser = finite_seconds, allow_hyphen_values = true)]
+    time_offset: Option<f64>,
     /// Compare joints in the world instead of relative to their parents
     #[arg(long)]
     world: bool,
@@ -121,9 +129,18 @@ fn step(text: &str) -> Result<Step, String> {
 
 /// A motion that cannot be compared is the input's fault.
 fn refused(error: CompareError) -> Failure {
+    let message = error.to_string();
     match error {
         CompareError::Evaluating { input, error } => Failure::evaluating(&input, &error),
-        error => Failure::new(ALL_INPUTS, error.to_string()),
+        CompareError::NoTimeInBoth { spans, .. } | CompareError::NoPoseInBoth { spans, .. } => {
+            // The difference of two times, without its rounding.
+            let apart = ((spans[0][0] - spans[1][0]) * 1e9).round() / 1e9;
+            let hint = format!(
+                "; --time-offset adds seconds to the times of the second ({apart} lets both begin together)"
+            );
+            Failure::new(ALL_INPUTS, message).hinted(&hint)
+        }
+        _ => Failure::new(ALL_INPUTS, message),
     }
 }
 
@@ -174,38 +191,46 @@ enum ComparisonReport {
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let inputs = arguments.inputs.with_repeats()?;
-    let [first, second] = &inputs[..] else {
-        return Err(Failure::usage(format!(
-            "two inputs are compared, not {}",
-            inputs.len()
-        )));
-    };
     check_range(arguments.start, arguments.end)?;
     if (arguments.start, arguments.end) != (None, None) && arguments.fps.is_none() {
         return Err(Failure::usage("--start and --end are for --fps; add it"));
     }
+    if let Some(folders) = folders::named(&arguments.inputs) {
+        return folders::run(arguments, folders);
+    }
+    let inputs = arguments.inputs.with_repeats()?;
+    let [first, second] = &inputs[..] else {
+        return Err(Failure::usage(format!(
+            "two files or two directories are compared, not {}",
+            words::count(inputs.len(), "file")
+        )));
+    };
     let paths = [first.as_path(), second.as_path()];
     arguments.check_table(paths)?;
-    let (report, rest) = match arguments.are_arrays(paths)? {
-        _ if arguments.is_of_trajectories() => {
-            let (found, rest) = arguments.trajectory(paths)?;
-            (ComparisonReport::Trajectory(Box::new(found)), rest)
-        }
-        true => {
-            let found = arguments.arrays(paths)?;
-            (ComparisonReport::Array(found), Ok(()))
-        }
-        false => {
-            let (found, rest) = arguments.clips(paths)?;
-            (ComparisonReport::Clips(found), rest)
-        }
-    };
+    let (report, rest) = arguments.compared(paths)?;
     arguments.print(&report)?;
     arguments.judge(&report).and(rest)
 }
 
 impl Arguments {
+    /// The differences of two files; and the failure of their animations that were refused.
+    fn compared(
+        &self,
+        paths: [&Path; 2],
+    ) -> Result<(ComparisonReport, Result<(), Failure>), Failure> {
+        Ok(match self.are_arrays(paths)? {
+            _ if self.is_of_trajectories() => {
+                let (found, rest) = self.trajectory(paths)?;
+                (ComparisonReport::Trajectory(Box::new(found)), rest)
+            }
+            true => (ComparisonReport::Array(self.arrays(paths)?), Ok(())),
+            false => {
+                let (found, rest) = self.clips(paths)?;
+                (ComparisonReport::Clips(found), rest)
+            }
+        })
+    }
+
     /// Refuses options for the joints of motions where none are compared.
     fn check_table(&self, paths: [&Path; 2]) -> Result<(), Failure> {
         let compared = match self.is_of_trajectories() {
@@ -300,6 +325,7 @@ impl Arguments {
             step: self.rpe,
             associate,
             max_gap: self.max_gap,
+            offset: self.time_offset.unwrap_or_default(),
         };
         let clips = [
             (&*names[0], &first.clip, tracks[0]),
@@ -330,9 +356,10 @@ impl Arguments {
         if !all || has_options {
             return Ok(false);
         }
-        if self.fps.is_some() || self.world || self.distance.is_some() {
+        if self.fps.is_some() || self.world || self.distance.is_some() || self.time_offset.is_some()
+        {
             return Err(Failure::usage(
-                "two arrays are compared number by number, without --fps, --world and --distance; \
+                "two arrays are compared number by number, without --fps, --world, --distance and --time-offset; \
                  say what they mean (--source-fps, --map) to compare them as motions",
             ));
         }
@@ -363,6 +390,7 @@ impl Arguments {
         let partner = partners(paths, [&loaded[0].clips, &loaded[1].clips])?;
         let engine = Engine::new(Device::Cpu)
             .map_err(|error| Failure::evaluating(&names::input(paths[0]), &error))?;
+        let offset = self.time_offset.unwrap_or_default();
         let mut found = Vec::new();
         for (index, first) in loaded[0].clips.iter().enumerate() {
             let second = &loaded[1].clips[partner[index]];
@@ -381,10 +409,15 @@ impl Arguments {
                 let whole = ClipPair {
                     inputs,
                     clips: [first, second],
+                    offset,
                 };
                 whole.check_parents(clips).map_err(refused)?;
             }
-            let pair = ClipPair { inputs, clips };
+            let pair = ClipPair {
+                inputs,
+                clips,
+                offset,
+            };
             found.push(self.differences(&engine, pair)?);
         }
         Ok((found, rest))

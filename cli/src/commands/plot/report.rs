@@ -8,9 +8,11 @@ use std::path::PathBuf;
 use glam::Vec3;
 use tumble_formats::motion::Motion;
 
+use crate::arguments::input::check_complete;
 use crate::arguments::interpolation::CurveChoice;
+use crate::batch::pipeline::clip_file_names;
 use crate::commands::info::Steps;
-use crate::commands::plot::source::curves::{NAMES, PlotSubject};
+use crate::commands::plot::source::curves::{NAMES, PlotSubject, box_name};
 use crate::commands::plot::source::{PlotSamples, PlotSource};
 use crate::commands::plot::subjects::{PANELS, moving_boxes};
 use crate::commands::plot::{Arguments, FigureWriter, note_curves};
@@ -46,26 +48,32 @@ pub(crate) fn write(
     let mut progress = Progress::new("drawing", (inputs.len() * each) as u64);
     let mut chapters = Vec::new();
     let outcome = arguments.for_each_input(&inputs, writer, |writer, path| {
-        let only = arguments.inputs.load_one(path)?;
-        let (clip, set) = (&only.clip, &only.clip.set);
-        let name = names::input(path);
-        let choices = arguments.choices(&name, clip)?;
-        note_curves(&name, clip, &choices);
-        let mut boxes = moving_boxes(set, &name);
-        boxes.truncate(PANELS);
-        let chapter = Chapter {
-            title: names::title(path, clip),
-            facts: facts(clip),
-            figures: figures(
-                writer,
-                (path, clip, boxes),
-                &choices,
-                samples,
-                &mut progress,
-            )?,
-        };
-        chapters.push(chapter);
-        only.rest
+        let loaded = arguments.inputs.load(path)?;
+        let files = clip_file_names(&loaded.clips);
+        for (clip, file) in loaded.clips.iter().zip(files) {
+            let name = names::input(path);
+            let choices = arguments.choices(&name, clip)?;
+            note_curves(&name, clip, &choices);
+            let mut boxes = moving_boxes(&clip.set, &name);
+            boxes.truncate(PANELS);
+            let stem = match loaded.clips.len() {
+                1 => writer.stem(path),
+                _ => format!("{}.{file}", writer.stem(path)),
+            };
+            let chapter = Chapter {
+                title: names::title(path, clip),
+                facts: facts(clip),
+                figures: figures(
+                    writer,
+                    (path, &stem, clip, boxes),
+                    &choices,
+                    samples,
+                    &mut progress,
+                )?,
+            };
+            chapters.push(chapter);
+        }
+        check_complete(&names::input(path), &loaded)
     });
     drop(progress);
     if chapters.is_empty() {
@@ -88,7 +96,7 @@ fn figures_of_one(methods: usize) -> usize {
 /// Draws all figures of one input.
 fn figures(
     writer: &mut FigureWriter,
-    (path, clip, boxes): (&PathBuf, &Motion, Vec<usize>),
+    (path, stem, clip, boxes): (&PathBuf, &str, &Motion, Vec<usize>),
     choices: &[CurveChoice],
     samples: &PlotSamples,
     progress: &mut Progress,
@@ -99,11 +107,7 @@ fn figures(
         |writer: &mut FigureWriter, methods, label: &str, caption, subject: &PlotSubject| {
             let source = PlotSource::new(name.clone(), clip, methods, samples)?;
             let figure = source.figure(&mut writer.device, subject)?;
-            let file = format!(
-                "{}-{label}.{}",
-                writer.stem(path),
-                writer.format.extension()
-            );
+            let file = format!("{stem}-{label}.{}", writer.format.extension());
             writer.draw(&figure, &file, path)?;
             shown.push(ReportFigure { file, caption });
             progress.advance(1);
@@ -116,12 +120,11 @@ fn figures(
     dimensions.dedup();
     for dimension in dimensions {
         let subject = PlotSubject::Dimensions(vec![dimension - 1]);
-        let (component, index) = (NAMES[(dimension - 1) % 4], (dimension - 1) / 4 + 1);
-        let part = match clip.skeleton.is_empty() {
-            true => "box",
-            false => "joint",
-        };
-        let about = format!("dimension {dimension}, {component} of {part} {index}");
+        let (component, index) = (NAMES[(dimension - 1) % 4], (dimension - 1) / 4);
+        let about = format!(
+            "dimension {dimension}, {component} of {}",
+            box_name(&clip.set, index)
+        );
         for one in choices.chunks(1) {
             let method = one[0].method;
             let label = format!("{method}-dimension-{dimension}");

@@ -67,6 +67,7 @@ impl FoundGhosts {
             let pair = ClipPair {
                 inputs: both.map(|clip| &*clip.name),
                 clips: both.map(ShownClip::motion),
+                offset: 0.0,
             };
             match pair.common_times() {
                 Ok(common) => {

@@ -25,6 +25,8 @@ pub struct ClipPair<'a> {
     pub inputs: [&'a str; 2],
     /// The clips.
     pub clips: [&'a Motion; 2],
+    /// Seconds to add to the times of the second clip, whose clock may be another.
+    pub offset: f64,
 }
 
 /// The times that two clips have in common, in seconds, on the clock of the first clip.
@@ -471,11 +473,11 @@ impl ClipPair<'_> {
     }
 
     /// The seconds to add to a time of the first clip for the same time of the second. Their clocks count from
-    /// different whole seconds.
+    /// different whole seconds, and may be apart by [`ClipPair::offset`].
     #[must_use]
     pub fn shift(&self) -> f64 {
         let [first, second] = self.clips;
-        (first.time_offset - second.time_offset) as f64
+        (first.time_offset - second.time_offset) as f64 - self.offset
     }
 
     /// Refuses rotations relative to the parents beside rotations relative to the world.

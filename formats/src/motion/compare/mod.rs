@@ -118,7 +118,7 @@ pub enum CompareError {
     NoPoseInBoth {
         /// Names of the clips in messages.
         inputs: [String; 2],
-        /// First and last time of each path, in seconds, on the clock of its file.
+        /// First and last time of each path, in seconds, on the clock of its file; of the second with the offset.
         spans: [[f64; 2]; 2],
     },
     /// The step of relative errors is longer than the path.

@@ -25,6 +25,8 @@ pub struct PathMeasure {
     pub associate: Associate,
     /// The longest interval between neighbouring keys that is interpolated, in seconds; `None` for no limit.
     pub max_gap: Option<f64>,
+    /// Seconds to add to the times of the estimate, whose clock may be another.
+    pub offset: f64,
 }
 
 /// The errors of an estimate against its reference.
@@ -155,7 +157,7 @@ impl PathDifference {
             }
         }
         // Each clip has its own time offset, in whole seconds.
-        let shift = (first.time_offset - clips[1].1.time_offset) as f64;
+        let shift = (first.time_offset - clips[1].1.time_offset) as f64 - measure.offset;
         let times = [0, 1].map(|side| {
             let (_, clip, track) = clips[side];
             let back = [0.0, shift][side];
@@ -166,10 +168,12 @@ impl PathDifference {
         if found.pairs.is_empty() {
             return Err(CompareError::NoPoseInBoth {
                 inputs: inputs(),
-                spans: clips.map(|(_, clip, track)| {
+                spans: [0, 1].map(|side| {
+                    let (_, clip, track) = clips[side];
                     let times = clip.set.track(track).times;
+                    let clock = clip.time_offset as f64 + [0.0, measure.offset][side];
                     let ends = [times.first(), times.last()];
-                    ends.map(|time| clip.time_offset as f64 + time.copied().unwrap_or_default())
+                    ends.map(|time| clock + time.copied().unwrap_or_default())
                 }),
             });
         }

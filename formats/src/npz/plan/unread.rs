@@ -44,8 +44,14 @@ impl ArchivePlan {
         options: &ReadOptions,
         warnings: &mut Warnings,
     ) {
+        if let Some(arrays) = archive.unreadable() {
+            let message =
+                format!("the headers of these arrays cannot be read: {arrays}; save them again");
+            warnings.warn(Code::ArraysNotRead, || (None, message));
+        }
         let name = |index: usize| &*archive.members[index].name;
         let others = self.not_read(archive, options).into_iter();
+        let others = others.filter(|&index| !archive.members[index].is_unreadable());
         let unusual = others.filter(|&index| !self.companions.contains(&name(index)));
         let quoted = unusual.map(|index| format!("`{}`", name(index)));
         if let Some(names) = listed(quoted.collect()) {

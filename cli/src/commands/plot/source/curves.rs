@@ -201,19 +201,21 @@ impl PlotSource<'_> {
             .flat_map(|curve| curve.pieces.iter().flatten());
         let shown = shown.chain(dots.iter().flat_map(|dots| &dots.points));
         let range = range_of(shown.map(|point| point.1));
+        // A name tells a joint; dimensions count the components of boxes without names.
+        let (name, is_named) = (self.box_name(index), has_name(self.set, index));
         let (title, label) = match components {
+            [one] if is_named => (format!("{} of {name}", NAMES[*one]), NAMES[*one]),
             [one] => {
-                let dimension = index * 4 + one + 1;
-                let name = NAMES[*one];
+                let (dimension, component) = (index * 4 + one + 1, NAMES[*one]);
                 (
-                    format!("dimension {dimension}: {name} of {}", self.box_name(index)),
-                    name,
+                    format!("dimension {dimension}: {component} of {name}"),
+                    component,
                 )
             }
+            _ if is_named => (name, "component"),
             _ => {
                 let (first, last) = (index * 4 + 1, index * 4 + 4);
-                let title = format!("{}: dimensions {first} to {last}", self.box_name(index));
-                (title, "component")
+                (format!("{name}: dimensions {first} to {last}"), "component")
             }
         };
         Ok(self.panel(title, label, range, curves, dots))
@@ -410,6 +412,10 @@ pub(crate) fn box_name(set: &TrackSet, index: usize) -> String {
         Some(name) => printable(name).into_owned(),
         None => format!("box {}", index + 1),
     }
+}
+
+fn has_name(set: &TrackSet, index: usize) -> bool {
+    set.track(index).name.is_some_and(|name| !name.is_empty())
 }
 
 /// The name of a scalar; `scalar 1` where it has none.

@@ -1,0 +1,246 @@
+//! Two directories, such as the results of a batch before and after a change: the files of one relative name are
+//! compared.
+
+use std::collections::BTreeMap;
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+use tumble_formats::compare::{ChannelDifference, ClipDifference, ScalarDifference};
+use tumble_formats::motion::ScalarKind;
+use tumble_formats::printable::printable;
+
+use crate::arguments::input::Inputs;
+use crate::commands::compare::{Arguments, ComparisonReport};
+use crate::messages::exit::{ALL_INPUTS, DIFFERENCE, Failure, Outcomes};
+use crate::messages::{listing, names, words};
+
+/// The two directories that a command line names; `None` where it names anything else.
+pub(super) fn named(inputs: &Inputs) -> Option<[&Path; 2]> {
+    match inputs.named_paths() {
+        [first, second] if first.is_dir() && second.is_dir() && !inputs.has_list() => {
+            Some([first, second])
+        }
+        _ => None,
+    }
+}
+
+/// The largest differences of two files, each over all animations, tracks and samples.
+#[derive(Debug, Clone, Copy, Default, Serialize)]
+struct LargestDifferences {
+    /// In degrees.
+    angle: f64,
+    /// Of positions and lengths, in the files' unit.
+    distance: f64,
+    /// Of scales, of other numbers and of arrays.
+    number: f64,
+    /// Tracks and scalars that only one of the files has.
+    missing: usize,
+}
+
+/// The comparison of the files of one name.
+#[derive(Debug, Serialize)]
+struct FilePair {
+    /// Path below both directories.
+    file: String,
+    #[serde(flatten)]
+    differences: Option<LargestDifferences>,
+    /// Why they cannot be compared.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    error: Option<String>,
+}
+
+/// The comparison of two directories, as JSON has it.
+#[derive(Debug, Serialize)]
+struct FolderDifference {
+    inputs: [String; 2],
+    pairs: Vec<FilePair>,
+    /// Files that only the first directory has, and those that only the second has.
+    missing: [Vec<String>; 2],
+}
+
+/// Compares all files of two directories that have one relative name.
+pub(super) fn run(arguments: &Arguments, folders: [&Path; 2]) -> Result<(), Failure> {
+    if let Some(option) = arguments
+        .csv
+        .then_some("--csv")
+        .or(arguments.table.set_option())
+    {
+        return Err(Failure::usage(format!(
+            "{option} is for the joints of two files, and two directories are compared; leave it out"
+        )));
+    }
+    let mut by_name: BTreeMap<PathBuf, [Option<PathBuf>; 2]> = BTreeMap::new();
+    for (side, folder) in folders.into_iter().enumerate() {
+        for found in arguments.inputs.gather_library(folder)?.files {
+            by_name.entry(found.below).or_default()[side] = Some(found.path);
+        }
+    }
+    let paths: Vec<&PathBuf> = by_name.values().flatten().flatten().collect();
+    arguments.inputs.check_formats(&paths)?;
+    let mut report = FolderDifference {
+        inputs: folders.map(names::input),
+        pairs: Vec::new(),
+        missing: Default::default(),
+    };
+    let mut pairs = Vec::new();
+    for (name, found) in &by_name {
+        let name = names::input(name);
+        match found {
+            [Some(first), Some(second)] => pairs.push((name, [&**first, &**second])),
+            [Some(_), None] => report.missing[0].push(name),
+            _ => report.missing[1].push(name),
+        }
+    }
+    if pairs.is_empty() {
+        let [first, second] = &report.inputs;
+        let message = format!(
+            "no file of {first} has the relative name of a file of {second}; to compare two files of other names, \
+             name both"
+        );
+        return Err(Failure::new(ALL_INPUTS, message));
+    }
+    let mut outcomes = Outcomes::of(pairs.len());
+    let mut over = 0;
+    for (file, paths) in pairs {
+        let compared = arguments.compared(paths);
+        let (pair, outcome) = match compared {
+            Ok((found, rest)) => {
+                over += usize::from(arguments.judge(&found).is_err());
+                (Ok(LargestDifferences::of(&found)), rest)
+            }
+            Err(failure) => (Err(failure.message().to_owned()), Err(failure)),
+        };
+        outcomes.add(outcome);
+        report.pairs.push(FilePair {
+            file,
+            differences: pair.as_ref().ok().copied(),
+            error: pair.err(),
+        });
+        if outcomes.is_ended() {
+            break;
+        }
+    }
+    match arguments.json {
+        true => listing::json(&report)?,
+        false => listing::text(&report.text())?,
+    }
+    outcomes.finish()?;
+    let has_bound = arguments.tolerance.is_some() || arguments.distance.is_some();
+    let missing: usize = report.missing.iter().map(Vec::len).sum();
+    let mut faults = Vec::new();
+    if over > 0 {
+        faults.push(format!("{} over the limit", words::count(over, "pair")));
+    }
+    if missing > 0 && has_bound {
+        faults.push(words::count(missing, "file") + " in only one of the directories");
+    }
+    match faults.is_empty() {
+        true => Ok(()),
+        false => Err(Failure::new(
+            DIFFERENCE,
+            format!("they differ: {}", faults.join(", ")),
+        )),
+    }
+}
+
+impl LargestDifferences {
+    fn of(report: &ComparisonReport) -> Self {
+        let mut all = Self::default();
+        match report {
+            ComparisonReport::Clips(clips) => clips.iter().for_each(|clip| all.add(clip)),
+            ComparisonReport::Array(found) => match &found.rotation {
+                Some(rotation) => all.angle = rotation.largest,
+                None => all.number = found.difference.largest,
+            },
+            ComparisonReport::Trajectory(found) => {
+                for errors in found.ape.iter().chain(&found.rpe) {
+                    all.angle = all.angle.max(errors.rotation.max);
+                    all.distance = all.distance.max(errors.translation.max);
+                }
+            }
+        }
+        all
+    }
+
+    fn add(&mut self, clip: &ClipDifference) {
+        let largest = |channel: &Option<ChannelDifference>| {
+            channel.as_ref().map_or(0.0, |it| it.spread.largest)
+        };
+        self.angle = self.angle.max(clip.rotation.spread.largest);
+        self.distance = self.distance.max(largest(&clip.translation));
+        self.number = self.number.max(largest(&clip.scale));
+        for ScalarDifference {
+            kind, difference, ..
+        } in &clip.scalars
+        {
+            let of_kind = match kind.parse() {
+                Ok(ScalarKind::Angle) => &mut self.angle,
+                Ok(ScalarKind::Length) => &mut self.distance,
+                _ => &mut self.number,
+            };
+            *of_kind = of_kind.max(difference.spread.largest);
+        }
+        let missing = clip.missing.iter().chain(&clip.missing_scalars);
+        self.missing += missing.map(Vec::len).sum::<usize>();
+    }
+
+    fn is_none(self) -> bool {
+        self.missing == 0 && [self.angle, self.distance, self.number] == [0.0; 3]
+    }
+}
+
+impl FolderDifference {
+    /// A line for each pair that differs, and a summary.
+    fn text(&self) -> String {
+        let mut text = String::new();
+        let (mut same, mut failed) = (0, 0);
+        for pair in &self.pairs {
+            let name = printable(&pair.file);
+            match (pair.differences, &pair.error) {
+                (Some(found), _) if found.is_none() => same += 1,
+                (Some(found), _) => {
+                    let mut parts = Vec::new();
+                    for (quantity, number, unit) in [
+                        ("angle", found.angle, "°"),
+                        ("distance", found.distance, ""),
+                        ("number", found.number, ""),
+                    ] {
+                        if number > 0.0 {
+                            parts.push(format!("{quantity} {}{unit}", words::decimals(number)));
+                        }
+                    }
+                    if found.missing > 0 {
+                        parts.push(format!("{} tracks or scalars in only one", found.missing));
+                    }
+                    let _ = writeln!(text, "{name}: {}", parts.join(", "));
+                }
+                _ => {
+                    failed += 1;
+                    let _ = writeln!(text, "{name}: not compared");
+                }
+            }
+        }
+        let pairs = words::count(self.pairs.len(), "pair");
+        let differing = self.pairs.len() - same - failed;
+        let _ = write!(
+            text,
+            "{pairs} of files: {same} without a difference, {differing} with one"
+        );
+        if failed > 0 {
+            let _ = write!(text, ", {failed} not compared");
+        }
+        for (folder, files) in self.inputs.iter().zip(&self.missing) {
+            if let Some(first) = files.first() {
+                let count = words::count(files.len(), "file");
+                let first = printable(first);
+                let _ = write!(text, "\n{count} only in {}: {first}", printable(folder));
+                if files.len() > 1 {
+                    text.push_str(" …");
+                }
+            }
+        }
+        text.push('\n');
+        text
+    }
+}
