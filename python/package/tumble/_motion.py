@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import glob as _glob
+import numbers
+import operator
 import os
+import pathlib
 import zipfile
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
@@ -182,6 +185,8 @@ class MotionLibrary(Generic[_A]):
     A clip without offsets, such as an SMPL body without a model of its shape, has rotations only: its positions and
     velocities are refused.
 
+    `paths`: the path of the file of each clip; empty for a clip that was not read from one.
+
     Times count from the first key of a clip, and are kept to at least 0.5 µs (30 ns for clips of up to two minutes);
     before 0 and after its end, a clip keeps its first and last pose.
 
@@ -198,6 +203,7 @@ class MotionLibrary(Generic[_A]):
     """
 
     names: list[str]
+    paths: list[str]
     lengths: NDArray[np.float64]
     rates: NDArray[np.float64]
     skipped: list[Skipped]
@@ -257,6 +263,10 @@ class MotionLibrary(Generic[_A]):
         ]
         kept = [index for index in range(len(clips)) if index not in left_out]
         self.names = [all_names[index] for index in kept]
+        self.paths = [os.fspath(clips[index].path or "") for index in kept]
+        # The place of each clip among those that shards share: in the list, or that of its file among all files.
+        self._places = np.array(kept, np.int64)
+        self._skipped_places = list(left_out)
         self.lengths = np.array([clips[index].duration for index in kept])
         self.rates = np.array([_rate(clips[index]) for index in kept])
         self._engine = engine if engine is not None else Engine()
@@ -324,11 +334,14 @@ class MotionLibrary(Generic[_A]):
         of every file belongs to the library, in the order of the names.
 
         `fps`: clips are sampled at this rate by `method`; an incomplete frame at the end is left out. `tracks`: the names
-        or the indices of joints, in the order of the results; their parents must be included, too. `shard`: read only the
-        files for one of several processes, as (rank, processes).
+        or the indices of joints, in the order of the results; their parents must be included, too. The keys of other joints
+        in NPZ files and pickles are not read. `shard`: read only the files for one of several processes, as
+        (rank, processes): the library is then `load(…).shard(rank, processes)`. For the order of the joints, the first file of
+        all is read, too, unless `skeleton` has it.
 
         `options`: the keywords of `tumble.load`, for each file, such as `source_fps`, `up`, `scale`, `offsets`,
-        `body_model` and `map`. `on_error`: "refuse" ends at the first file that cannot be read; "skip" leaves out such
+        `body_model` and `map`. With `tracks`, `offsets` are those of the selected joints, in the order of `tracks`, or of
+        all joints of the file, in its order, as the number of rows says; or a dict by names. `on_error`: "refuse" ends at the first file that cannot be read; "skip" leaves out such
         files, and clips that do not fit the skeleton, and lists them in `skipped`. Files of AMASS without a motion
         (`shape.npz`, `*_stagei.npz`) are left out, too. `progress`: a bar such as `tqdm.tqdm` or an instance of it, or a
         function, which is called with the number of files read so far and of all. `packed`, `device`: as of the class.
@@ -347,27 +360,75 @@ class MotionLibrary(Generic[_A]):
             if not found:
                 raise FileNotFoundError(f"no file matches {pattern}")
             paths += found
-        if shard is not None:
-            paths = [paths[index] for index in _share(len(paths), *shard)]
-        with _bar(progress, len(paths)) as step:
-            read, faults = load_all(
-                paths, options, skip=_skips(on_error), progress=step, fps=fps, tracks=tracks, method=method
+        rank, processes = (0, 1) if shard is None else _rank(shard)
+        places = list(_share(len(paths), rank, processes))
+        skip = _skips(on_error)
+
+        def read(
+            indices: list[int], step: Callable[[int, int], object] | None = None
+        ) -> tuple[list[tuple[int, Clip]], list[tuple[int, Skipped]]]:
+            """The clips of files, and the files that were skipped, each with the index of the file."""
+            files, faults = load_all(
+                [paths[index] for index in indices],
+                options,
+                skip=skip,
+                progress=step,
+                fps=fps,
+                tracks=tracks,
+                method=method,
             )
-        skipped = [Skipped(os.fspath(path), None, code, message) for path, code, message in faults]
-        clips = [clip for file in read for clip in file.clips]
-        if not clips and skipped:
-            raise InputError(f"no file could be read; the first: {skipped[0].message}")
+            at_fault = [(os.fspath(path), code, message) for path, code, message in faults]
+            clips: list[tuple[int, Clip]] = []
+            left_out: list[tuple[int, Skipped]] = []
+            rest = iter(files)
+            for index in indices:
+                # Files were read in this order.
+                if at_fault and at_fault[0][0] == os.fspath(pathlib.Path(paths[index])):
+                    path, code, message = at_fault.pop(0)
+                    left_out.append((index, Skipped(path, None, code, message)))
+                else:
+                    clips += [(index, clip) for clip in next(rest).clips]
+            return clips, left_out
+
+        with _bar(progress, len(places)) as step:
+            clips, skipped = read(places, step)
+        if not clips:
+            if skipped:
+                raise InputError(f"no file could be read; the first: {skipped[0][1].message}")
+            if shard is not None:
+                raise InputError(f"shard: none of the {len(paths)} files is for process {rank} of {processes}")
+        # The joints have the order of the first clip of all files, whichever process it belongs to.
+        before: list[tuple[int, Clip]] = []
+        if skeleton is None:
+            for index in range(clips[0][0] if clips else 0):
+                if index % processes != rank and not before:
+                    before = read([index])[0]
         if skeleton is not None and not isinstance(skeleton, tuple):
             skeleton = shaped(_clip_of(skeleton), tracks=tracks)
+        every = before + clips
         made: MotionLibrary[Any] = cls(
-            clips, method=method, skeleton=skeleton, engine=engine, on_error=on_error, packed=packed, device=device
+            [clip for _, clip in every],
+            method=method,
+            skeleton=skeleton,
+            engine=engine,
+            on_error=on_error,
+            packed=packed,
+            device=device,
         )
-        made.skipped = skipped + made.skipped
-        return made
+        file_of = np.array([index for index, _ in every], np.int64)
+        made._places = file_of[made._places]
+        made.skipped = [one for _, one in skipped] + made.skipped
+        made._skipped_places = [index for index, _ in skipped] + [int(file_of[place]) for place in made._skipped_places]
+        return made if shard is None else made.shard(rank, processes)
 
     def _put_on(self, device: _Device | None) -> None:
         """Copies the clips to a device."""
         self._device: Engine | None = None
+        if isinstance(device, str) and device.lower() == "auto":
+            raise InputError(
+                'device: with "auto", results could be arrays of NumPy\'s or DeviceArrays; give "cpu", "vulkan", or a name '
+                "or an index in tumble.devices()"
+            )
         if device is None or (isinstance(device, str) and device.lower() == "cpu"):
             return
         self._device = device if isinstance(device, Engine) else Engine(device)
@@ -384,19 +445,34 @@ class MotionLibrary(Generic[_A]):
         return "CPU" if self._device is None else self._device.device
 
     def shard(self, rank: int, processes: int) -> MotionLibrary[_A]:
-        """The clips for one of several processes; each clip belongs to one process. The memory is shared, not copied.
+        """The clips for one of several processes; each clip belongs to one process. The clips of a library that was loaded are
+        divided by their files, as `load` with `shard` divides them. The memory is shared, not copied; `save` and pickles
+        contain the clips of the shard alone.
 
         >>> import tumble
         >>> doors = [tumble.Clip([0.0, 2.0], [[[0, 0, 0, 1], [0, 0, 1, 0]]], parents=[None], name=name) for name in "abc"]
         >>> tumble.MotionLibrary(doors).shard(0, 2).names
         ['a', 'c']
         """
-        share = _share(len(self), rank, processes)
+        rank, processes = _rank((rank, processes))
+        share = np.flatnonzero(self._places % processes == rank)
+        if not share.size:
+            raise InputError(f"shard: none of the {len(self)} clips is for process {rank} of {processes}")
+        part = self._part(share)
+        part._places = part._places // processes
+        places = [(place, one) for place, one in zip(self._skipped_places, self.skipped) if place % processes == rank]
+        part.skipped = [one for _, one in places]
+        part._skipped_places = [place // processes for place, _ in places]
+        return part
+
+    def _part(self, clips: NDArray[np.int64]) -> MotionLibrary[_A]:
+        """Some clips, by their indices, in the same memory."""
         part: MotionLibrary[_A] = MotionLibrary.__new__(MotionLibrary)
         part.__dict__.update(self.__dict__)
-        part.names = [self.names[index] for index in share]
-        part.lengths, part.rates = self.lengths[share], self.rates[share]
-        part._only = self._ids(np.array(share, np.int64))
+        part.names = [self.names[index] for index in clips]
+        part.paths = [self.paths[index] for index in clips]
+        part.lengths, part.rates, part._places = self.lengths[clips], self.rates[clips], self._places[clips]
+        part._only = self._ids(clips)
         return part
 
     def _ids(self, ids: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -553,10 +629,7 @@ class MotionLibrary(Generic[_A]):
         >>> library.sample(0, [0.5, 1.0], rotations="6d").rotations.shape
         (2, 1, 6)
         """
-        ids = _on_host(clip_ids)
-        if ids.dtype.kind not in "iu" and ids.size:
-            raise InputError(f"clip_ids: their type is {ids.dtype}; give whole numbers")
-        moments = _on_host(times).astype(np.float64, copy=False)
+        ids, moments = _indices("clip_ids", clip_ids), _numbers("times", times, "seconds")
         try:
             shape = np.broadcast_shapes(ids.shape, moments.shape)
         except ValueError:
@@ -565,6 +638,8 @@ class MotionLibrary(Generic[_A]):
         ids = self._ids(np.ascontiguousarray(np.broadcast_to(ids, shape), np.int64).reshape(-1))
         moments = np.ascontiguousarray(np.broadcast_to(moments, shape)).reshape(-1)
         each = _shapes_of(order, rotations)
+        if isinstance(arrays, str):
+            raise TypeError(f'arrays: {arrays!r} is one name; give a list, such as ["{arrays}"]')
         for name in arrays if arrays is not None else ():
             if name not in _NAMES:
                 raise InputError(f"arrays: there is no `{name}`; there are {', '.join(_NAMES)}")
@@ -579,6 +654,8 @@ class MotionLibrary(Generic[_A]):
             joints = self._motions.joints
             asked = _NAMES if arrays is None else arrays
             out = MotionState(**{name: _aligned((*shape, joints, *each[name])) for name in asked})
+        elif not isinstance(out, MotionState):
+            raise TypeError(f"out: it is of the type {type(out).__name__}; give a MotionState, such as a result of `sample`")
         elif arrays is not None:
             raise InputError("arrays and out: the arrays of `out` are those that are filled; give one of the two")
         else:
@@ -597,7 +674,7 @@ class MotionLibrary(Generic[_A]):
             self._fill(ids, moments, finite, found)
             for of, array in ((found.rotations, filled.rotations), (found.world_rotations, filled.world_rotations)):
                 if of is not None and array is not None:
-                    represent(of, rotations, array)
+                    represent(self._engine, of, rotations, array)
         if order == "wxyz":
             for array in (out.rotations, out.world_rotations):
                 if array is not None:
@@ -607,9 +684,12 @@ class MotionLibrary(Generic[_A]):
     def _frames(self, ids: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """The rates and lengths of the clips in memory, for differences between frames."""
         rates = self._each(self.rates)
-        known = np.isnan(rates[ids[(ids >= 0) & (ids < len(rates))]])
-        if known.any():
-            raise InputError("finite: a clip has no rate; load it with `fps`")
+        known = ids[(ids >= 0) & (ids < len(rates))]
+        unknown = known[np.isnan(rates[known])]
+        if unknown.size:
+            index = int(unknown[0]) if self._only is None else int(np.flatnonzero(self._only == unknown[0])[0])
+            name = self.paths[index] or self.names[index]
+            raise InputError(f"finite: clip {index} ({name}) has no rate; load it with `fps`")
         return rates, self._each(self.lengths)
 
     def _sampled_on_device(
@@ -787,10 +867,11 @@ class MotionLibrary(Generic[_A]):
         >>> library.sample_windows([0, 0, 0], [0.0, 0.5, 1.0], 10, fps=30).rotations.shape
         (3, 10, 1, 4)
         """
-        if count < 0 or not fps > 0:
-            raise InputError(f"count and fps: {count} and {fps}; give a number of states, and a rate greater than 0")
-        ids, first = _on_host(clip_ids)[..., None], _on_host(starts).astype(np.float64, copy=False)[..., None]
-        times = first + np.arange(count) / fps
+        count, rate = _count("count", count, "a number of states"), _number("fps", fps, "frames a second")
+        if not rate > 0:
+            raise InputError(f"fps: {fps} is no rate greater than 0")
+        ids, first = _indices("clip_ids", clip_ids)[..., None], _numbers("starts", starts, "seconds")[..., None]
+        times = first + np.arange(count) / rate
         keywords: dict[str, Any] = {"finite": finite, "order": order, "rotations": rotations}
         if arrays is not None:
             keywords["arrays"] = arrays
@@ -820,10 +901,12 @@ class MotionLibrary(Generic[_A]):
         >>> ids
         array([0, 0, 0, 0])
         """
-        if not 0 <= window < np.inf:
+        count, window = _count("count", count, "a number of clips"), _number("window", window, "seconds")
+        if window < 0:
             raise InputError(f"window: {window!r} is no number of seconds from 0 on")
+        _check_generator(rng)
         left = self.lengths - window
-        each = np.asarray(np.maximum(left, 0.0) if weights is None else weights, np.float64)
+        each = np.maximum(left, 0.0) if weights is None else _numbers("weights", weights, "numbers")
         if each.shape != (len(self),) or not np.isfinite(each).all() or (each < 0).any():
             raise InputError(f"weights: give a number of 0 or more for each of the {len(self)} clips")
         fits = left >= 0
@@ -862,7 +945,8 @@ class MotionLibrary(Generic[_A]):
         >>> ((0 <= times) & (times <= 2)).all()
         np.True_
         """
-        ids = np.asarray(clip_ids)
+        _check_generator(rng)
+        ids = _indices("clip_ids", clip_ids)
         unknown = ids[(ids < 0) | (ids >= len(self))]
         if unknown.size:
             raise InputError(f"clip_ids: there is no clip {unknown[0]}; there are {len(self)}, from 0")
@@ -930,6 +1014,11 @@ class MotionLibrary(Generic[_A]):
             raise InputError(f"{file or 'arrays'}: not a motion library of this version of tumble")
         self: MotionLibrary[Any] = cls.__new__(cls)
         self.names = [str(name) for name in arrays["names"]]
+        clips = len(self.names)
+        self.paths = [str(path) for path in arrays["paths"]] if "paths" in arrays else [""] * clips
+        self._places = np.asarray(arrays["places"] if "places" in arrays else np.arange(clips), np.int64)
+        if len(self.paths) != clips or self._places.shape != (clips,):
+            raise InputError(f"{file or 'arrays'}: its paths or places are not those of {clips} clips")
         self.lengths = np.asarray(arrays["lengths"])
         self.rates = np.asarray(arrays["rates"])
         self._method = str(arrays["method"])
@@ -937,6 +1026,7 @@ class MotionLibrary(Generic[_A]):
         self._engine = engine if engine is not None else Engine()
         self._file = file
         self.skipped = []
+        self._skipped_places: list[int] = []
         self._only = np.asarray(arrays["only"]) if "only" in arrays else None
         self._put_on(device)
         return self
@@ -946,18 +1036,21 @@ class MotionLibrary(Generic[_A]):
             "version": np.array(_VERSION),
             "method": np.array(self._method),
             "names": np.array(self.names, dtype=np.str_),
+            "paths": np.array(self.paths, dtype=np.str_),
+            "places": self._places,
             "lengths": self.lengths,
             "rates": self.rates,
             "joint_names": np.array(self.joint_names, dtype=np.str_),
-            "unplaced": np.array(self._motions.unplaced, dtype=np.str_),
         }
-        if self._only is not None:
-            about["only"] = self._only
-        return {**about, **self._motions.arrays()}
+        unplaced, only = self._motions.unplaced, None if self._only is None else self._only.tolist()
+        if only is not None and unplaced:
+            unplaced = [unplaced[index] for index in only]
+        about["unplaced"] = np.array(unplaced, dtype=np.str_)
+        return {**about, **self._motions.arrays(only)}
 
     def __reduce__(self) -> tuple[Any, ...]:
         if self._file is not None:
-            return _opened, (self._file, self._engine, self._only, self._device)
+            return _opened, (self._file, self._engine, self._only, self._device, self._places)
         return MotionLibrary._of_arrays, (self._arrays(), self._engine, None, self._device)
 
     def __len__(self) -> int:
@@ -1050,21 +1143,93 @@ def _flat(state: MotionState, axes: int) -> MotionState:
 
 
 def _opened(
-    file: str, engine: Engine, only: NDArray[np.int64] | None = None, device: Engine | None = None
+    file: str,
+    engine: Engine,
+    only: NDArray[np.int64] | None = None,
+    device: Engine | None = None,
+    places: NDArray[np.int64] | None = None,
 ) -> MotionLibrary[Any]:
     library: MotionLibrary[Any] = MotionLibrary.open(file, engine=engine, device=device)
-    if only is None or library._only is not None:
-        return library
-    library.names = [library.names[index] for index in only]
-    library.lengths, library.rates, library._only = library.lengths[only], library.rates[only], only
+    if only is not None and library._only is None:
+        library = library._part(only)
+    if places is not None:
+        library._places = places
     return library
+
+
+def _rank(shard: object) -> tuple[int, int]:
+    """The rank of a process, and the number of processes."""
+    if not isinstance(shard, tuple | list) or len(shard) != 2:
+        raise TypeError(f"shard: {shard!r}; give (rank, processes)")
+    rank, processes = (_count("shard", number, "(rank, processes)") for number in shard)
+    if not rank < processes:
+        raise InputError(f"shard: {rank} of {processes}; give a rank from 0 and below the number of processes")
+    return rank, processes
 
 
 def _share(count: int, rank: int, processes: int) -> range:
     """The indices that are the share of a process."""
-    if not 0 <= rank < processes:
-        raise InputError(f"shard: {rank} of {processes}; give a rank from 0 and below the number of processes")
     return range(rank, count, processes)
+
+
+def _is_number(value: object) -> bool:
+    """Whether it is a real number: no truth value, and no duration of NumPy's."""
+    return isinstance(value, numbers.Real) and not isinstance(value, bool | np.bool_ | np.timedelta64)
+
+
+def _count(label: str, value: object, meaning: str) -> int:
+    """A whole number from 0 on."""
+    if not _is_number(value) or not hasattr(value, "__index__"):
+        raise TypeError(f"{label}: {value!r}; give {meaning}, as a whole number from 0 on")
+    number = operator.index(value)
+    if number < 0:
+        raise InputError(f"{label}: {number}; give {meaning}, as a whole number from 0 on")
+    return number
+
+
+def _number(label: str, value: object, unit: str) -> float:
+    """A finite number."""
+    if not _is_number(value):
+        raise TypeError(f"{label}: {value!r}; give {unit}, as a number")
+    number = float(value)  # type: ignore[arg-type]
+    if not np.isfinite(number):
+        raise InputError(f"{label}: {number} is not finite")
+    return number
+
+
+def _numbers(label: str, values: object, unit: str) -> NDArray[np.float64]:
+    """Numbers of any shape. What converts to numbers, but means something else, is refused: truth values, durations and
+    dates, texts."""
+    array = _on_host(values)
+    if array.dtype.kind == "O" and all(_is_number(value) for value in array.flat):
+        array = array.astype(np.float64)
+    if array.dtype.kind not in "fiu":
+        hint = ", such as durations / np.timedelta64(1, 's')" if array.dtype.kind == "m" else ""
+        raise TypeError(f"{label}: their type is {array.dtype}{_first(array)}; give {unit}, as numbers{hint}")
+    return array.astype(np.float64, copy=False)
+
+
+def _first(array: NDArray[Any]) -> str:
+    return f", such as {array.flat[0]!r}" if array.size else ""
+
+
+def _indices(label: str, values: object) -> NDArray[np.int64]:
+    """Whole numbers of any shape."""
+    array = _on_host(values)
+    if not array.size and array.dtype.kind == "f":
+        array = array.astype(np.int64)
+    if array.dtype.kind == "b":
+        raise InputError(f"{label}: a mask of truth values; give whole numbers, such as np.flatnonzero(mask)")
+    if array.dtype.kind not in "iu":
+        raise InputError(f"{label}: their type is {array.dtype}{_first(array)}; give whole numbers")
+    if array.dtype.kind == "u" and array.size and array.max() > np.iinfo(np.int64).max:
+        raise InputError(f"{label}: there is no clip {array.max()}")
+    return array.astype(np.int64, copy=False)
+
+
+def _check_generator(rng: object) -> None:
+    if not isinstance(rng, np.random.Generator):
+        raise TypeError(f"rng: it is of the type {type(rng).__name__}; give a generator, such as np.random.default_rng(1)")
 
 
 @contextmanager
