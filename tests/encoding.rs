@@ -9,9 +9,37 @@ use crate::support::{KERNEL_OPTIONS, hostile_set, is_due, vulkan_engines};
 use glam::Quat;
 use tumble::vulkan::tuning::{Mapping, Reads};
 use tumble::{
-    Axes, Clip, Device, Encoding, Engine, Error, Interpolation, Layout, Quantity, SampleTimes,
-    TrackSet, method,
+    Axes, Clip, Device, Encoding, Engine, Error, Interpolation, Layout, MatrixOrder, Quantity,
+    SampleTimes, TrackSet, method,
 };
+
+/// On the threads of an engine, too.
+#[test]
+fn matrices_are_those_of_the_encoding_whole_or_their_first_two_columns() {
+    let rotation = |i: u16| Quat::from_rotation_y(0.1 * f32::from(i)) * Quat::from_rotation_x(0.3);
+    let rotations: Vec<[f32; 4]> = (0..1000).map(|i| rotation(i).to_array()).collect();
+    let engine = Engine::new(Device::Cpu).unwrap();
+    for order in MatrixOrder::ALL {
+        for count in [0, 1, 256, 1000] {
+            let rotations = &rotations[..count];
+            let mut expected = vec![0.0_f32; 9 * count];
+            let bytes = bytemuck::cast_slice_mut(&mut expected);
+            Encoding::Matrix3x3(order).encode(rotations, bytes).unwrap();
+            let mut found = vec![0.0; 9 * count];
+            engine.matrices_into(rotations, order, &mut found).unwrap();
+            assert_eq!(found, expected);
+            let mut six = vec![0.0; 6 * count];
+            engine.matrices_into(rotations, order, &mut six).unwrap();
+            let first = expected.chunks(9).flat_map(|matrix| &matrix[..6]);
+            assert!(six.iter().eq(first));
+        }
+        let refused = engine.matrices_into(&rotations[..2], order, &mut [0.0; 16]);
+        assert!(matches!(
+            refused,
+            Err(Error::OutputLength { needed: 2, .. })
+        ));
+    }
+}
 
 /// Frame by frame, on cards neighbouring invocations evaluate the same run of neighbouring tracks: more tracks than fill
 /// their lanes, keys on frames and off them, listed times, parts of a result, and components that are nearly 0.

@@ -7,7 +7,7 @@ use numpy::{
     PyUntypedArrayMethods,
 };
 use pyo3::conversion::FromPyObjectOwned;
-use pyo3::exceptions::{PyMemoryError, PyTypeError, PyValueError};
+use pyo3::exceptions::{PyMemoryError, PyOverflowError, PyTypeError, PyValueError};
 use pyo3::intern;
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
@@ -183,8 +183,22 @@ pub(crate) fn vectors(value: &Bound<'_, PyAny>, name: &str) -> PyResult<(Vec<usi
     ))
 }
 
+/// Whether an object converts to a number, but is none: True and False, and durations of NumPy's, whose number is that of
+/// their unit.
+fn is_no_number(value: &Bound<'_, PyAny>) -> PyResult<bool> {
+    let kind = value.get_type().name()?;
+    let kinds = ["bool", "bool_", "timedelta64", "datetime64"];
+    Ok(kinds.iter().any(|name| kind == *name))
+}
+
 /// One finite number.
 pub(crate) fn number(value: &Bound<'_, PyAny>, label: &str, unit: &str) -> PyResult<f64> {
+    if is_no_number(value)? {
+        let shown = value.repr()?;
+        return Err(PyTypeError::new_err(format!(
+            "{label}: {shown} is no number; give {unit}, as a number"
+        )));
+    }
     let number: f64 = value.extract().map_err(|error| {
         expected(value.py(), error, || {
             format!("{label}: give {unit}, as a number")
@@ -193,6 +207,28 @@ pub(crate) fn number(value: &Bound<'_, PyAny>, label: &str, unit: &str) -> PyRes
     match number.is_finite() {
         true => Ok(number),
         false => Err(input(format!("{label}: {number} is not finite"))),
+    }
+}
+
+/// A whole number from 0 on; True and False are none.
+pub(crate) fn whole_number<T: TryFrom<u64>>(
+    value: &Bound<'_, PyAny>,
+    label: &str,
+    meaning: &str,
+) -> PyResult<T> {
+    let refused = || {
+        let shown = value
+            .repr()
+            .map_or_else(|_| String::new(), |text| format!("{text}: "));
+        format!("{label}: {shown}give {meaning}, as a whole number from 0 on")
+    };
+    if is_no_number(value)? {
+        return Err(PyTypeError::new_err(refused()));
+    }
+    match value.extract::<u64>() {
+        Ok(number) => T::try_from(number).map_err(|_| input(refused())),
+        Err(error) if error.is_instance_of::<PyOverflowError>(value.py()) => Err(input(refused())),
+        Err(error) => Err(expected(value.py(), error, refused)),
     }
 }
 

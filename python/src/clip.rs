@@ -82,6 +82,18 @@ impl Clip {
         }
     }
 
+    /// The clip without the other contents of its file, which do not fit it.
+    pub(crate) fn without_document(self) -> Self {
+        let source = self.source.map(|source| {
+            Arc::new(Source {
+                document: None,
+                is_changed: true,
+                ..(*source).clone()
+            })
+        });
+        Self { source, ..self }
+    }
+
     /// The length of each box, where the clip is of a file about boxes.
     pub(crate) fn box_length(&self) -> Option<f64> {
         self.source.as_ref().and_then(|source| source.box_length)

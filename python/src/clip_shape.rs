@@ -1,11 +1,10 @@
 //! The work of a motion library on each clip that it reads: it chooses joints, and samples them at a rate.
 
-use std::fmt;
-
 use pyo3::prelude::*;
 use pyo3::types::PyString;
 use tumble::{Device, Engine, FrameRate, SampleTimes};
-use tumble_formats::motion::Motion;
+use tumble_formats::adjust::JointOffsets;
+use tumble_formats::motion::{Motion, TrackName};
 use tumble_formats::sample::{ChannelMethods, MethodChoice};
 
 use crate::clip::Clip;
@@ -19,24 +18,8 @@ pub(crate) struct ClipShape {
     /// The rate of the keys; `None`: those of the file.
     rate: Option<FrameRate>,
     /// The joints, in this order; `None`: all.
-    joints: Option<Vec<JointName>>,
+    joints: Option<Vec<TrackName>>,
     method: MethodChoice,
-}
-
-/// A joint, by its name or its index.
-#[derive(Debug, Clone, PartialEq)]
-enum JointName {
-    Name(String),
-    Index(usize),
-}
-
-impl fmt::Display for JointName {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Name(name) => write!(f, "`{name}`"),
-            Self::Index(index) => write!(f, "{index}"),
-        }
-    }
 }
 
 impl ClipShape {
@@ -57,15 +40,70 @@ impl ClipShape {
         })
     }
 
-    /// The clip in this shape.
+    /// The joints that are selected; `None`: all.
+    pub(crate) fn joints(&self) -> Option<&[TrackName]> {
+        self.joints.as_deref()
+    }
+
+    /// Whether offsets are those of the selected joints, not of all joints of a file. Those with names are found by them.
+    ///
+    /// # Errors
+    /// They may be of either, or are of neither.
+    pub(crate) fn selects_offsets(
+        &self,
+        offsets: &JointOffsets,
+        clip: &Motion,
+    ) -> Result<bool, String> {
+        let Some(joints) = &self.joints else {
+            return Ok(false);
+        };
+        if !offsets.names().is_empty() {
+            let names: Vec<String> = (0..clip.set.track_count())
+                .map(|track| clip.set.track_name(track))
+                .collect();
+            let unknown = offsets.names().iter().find(|name| !names.contains(name));
+            return unknown.map_or(Ok(true), |name| {
+                let known: Vec<&str> = names.iter().map(String::as_str).collect();
+                Err(unknown_name(
+                    &format!("there is no joint `{name}`"),
+                    name,
+                    &known,
+                ))
+            });
+        }
+        let (count, all) = (offsets.joint_count(), clip.set.track_count());
+        match (count == joints.len(), count == all) {
+            (true, false) => Ok(true),
+            (false, true) => Ok(false),
+            (true, true) if tracks(clip, joints)?.into_iter().eq(0..all) => Ok(false),
+            (true, true) => Err(format!(
+                "`tracks` has all {all} joints in another order than the file, so that these offsets may be in either order; \
+                 give a dict of x, y, z by the names of joints"
+            )),
+            (false, false) => Err(format!(
+                "{count} offsets for {} of {all} joints; give one for each of `tracks`, in their order, or one for each joint \
+                 of the file, in its order, or a dict of x, y, z by the names of joints",
+                joints.len()
+            )),
+        }
+    }
+
+    /// The clip with the selected joints.
     ///
     /// # Errors
     /// The fault, to follow the name of the clip.
-    pub(crate) fn applied(&self, clip: Motion) -> Result<Motion, String> {
-        let clip = match &self.joints {
-            Some(joints) => selected(&clip, joints)?,
-            None => clip,
-        };
+    pub(crate) fn selected(&self, clip: Motion) -> Result<Motion, String> {
+        match &self.joints {
+            Some(joints) => selected(&clip, joints),
+            None => Ok(clip),
+        }
+    }
+
+    /// The clip at the rate.
+    ///
+    /// # Errors
+    /// As [`Self::selected`].
+    pub(crate) fn sampled(&self, clip: Motion) -> Result<Motion, String> {
         match self.rate {
             Some(rate) if clip.rate != Some(rate) => self.at_rate(&clip, rate),
             _ => Ok(clip),
@@ -90,7 +128,7 @@ impl ClipShape {
     }
 }
 
-fn joint_names(tracks: &Bound<'_, PyAny>) -> PyResult<Vec<JointName>> {
+fn joint_names(tracks: &Bound<'_, PyAny>) -> PyResult<Vec<TrackName>> {
     let explained = |error| {
         expected(tracks.py(), error, || {
             "tracks: give a list of the names or the indices of joints".to_owned()
@@ -104,11 +142,11 @@ fn joint_names(tracks: &Bound<'_, PyAny>) -> PyResult<Vec<JointName>> {
     let one = |joint: PyResult<Bound<'_, PyAny>>| {
         let joint = joint?;
         match joint.cast::<PyString>() {
-            Ok(name) => Ok(JointName::Name(name.to_cow()?.into_owned())),
-            Err(_) => joint.extract().map(JointName::Index),
+            Ok(name) => Ok(TrackName::Name(name.to_cow()?.into_owned())),
+            Err(_) => joint.extract().map(TrackName::Index),
         }
     };
-    let names: PyResult<Vec<JointName>> = tracks.try_iter().map_err(explained)?.map(one).collect();
+    let names: PyResult<Vec<TrackName>> = tracks.try_iter().map_err(explained)?.map(one).collect();
     let names = names.map_err(explained)?;
     match names
         .iter()
@@ -121,32 +159,39 @@ fn joint_names(tracks: &Bound<'_, PyAny>) -> PyResult<Vec<JointName>> {
     }
 }
 
-/// Some joints of a clip, in this order.
-fn selected(clip: &Motion, joints: &[JointName]) -> Result<Motion, String> {
+/// The tracks of some joints of a clip.
+fn tracks(clip: &Motion, joints: &[TrackName]) -> Result<Vec<usize>, String> {
     let names: Vec<String> = (0..clip.set.track_count())
         .map(|it| clip.set.track_name(it))
         .collect();
-    let find = |joint: &JointName| match joint {
-        JointName::Name(name) => names.iter().position(|known| known == name).ok_or_else(|| {
+    let find = |joint: &TrackName| match joint {
+        TrackName::Name(name) => names.iter().position(|known| known == name).ok_or_else(|| {
             let known: Vec<&str> = names.iter().map(String::as_str).collect();
             unknown_name(&format!("tracks: there is no joint `{name}`"), name, &known)
         }),
-        &JointName::Index(index) if index < names.len() => Ok(index),
-        JointName::Index(index) => {
+        &TrackName::Index(index) if index < names.len() => Ok(index),
+        TrackName::Index(index) => {
             let count = names.len();
             Err(format!(
                 "tracks: there is no joint {index}; there are {count}, from 0"
             ))
         }
     };
-    let tracks: Vec<usize> = joints.iter().map(find).collect::<Result<_, _>>()?;
+    joints.iter().map(find).collect()
+}
+
+/// Some joints of a clip, in this order.
+fn selected(clip: &Motion, joints: &[TrackName]) -> Result<Motion, String> {
+    let tracks = tracks(clip, joints)?;
+    let name = |track: usize| clip.set.track_name(track);
     let parent = |track: usize| clip.skeleton.get(track).and_then(|joint| joint.parent);
     for &track in &tracks {
         // The position relative to the parent would be lost.
         if let Some(parent) = parent(track).filter(|parent| !tracks.contains(parent)) {
             return Err(format!(
                 "tracks: `{}` is a child of `{}`, which is left out; name that joint, too",
-                names[track], names[parent]
+                name(track),
+                name(parent)
             ));
         }
     }
@@ -165,6 +210,7 @@ pub(crate) fn shaped(
 ) -> PyResult<Clip> {
     let shape = ClipShape::new(fps, tracks, method)?;
     let (py, clip) = (clip.py(), clip.get());
-    let motion = py.detach(|| guarded(|| shape.applied((*clip.motion).clone()).map_err(input)));
+    let applied = |motion: Motion| shape.sampled(shape.selected(motion)?);
+    let motion = py.detach(|| guarded(|| applied((*clip.motion).clone()).map_err(input)));
     Ok(clip.with_keys(motion?))
 }

@@ -9,7 +9,7 @@ use tumble_formats::learning::{
     SixOrder,
 };
 
-use crate::arrays::{ArrayValues, ListArgument, Order, doubles, vectors};
+use crate::arrays::{ArrayValues, ListArgument, Order, doubles, vectors, whole_number};
 use crate::errors::input;
 use crate::names::{one_of, option_named};
 use crate::output::shown;
@@ -244,9 +244,21 @@ fn axis_of(axis: &Bound<'_, PyAny>) -> PyResult<usize> {
     one_of(axis, "axis", &[("x", 0), ("y", 1), ("z", 2)])
 }
 
+/// An odd number of frames.
+fn odd_window(window: &Bound<'_, PyAny>) -> PyResult<usize> {
+    let count = whole_number(window, "window", "an odd number of frames")?;
+    match count % 2 {
+        0 => Err(input(format!(
+            "window: {count} is even; give an odd number of frames"
+        ))),
+        _ => Ok(count),
+    }
+}
+
 /// Which bodies touch the ground: bool (…), of `positions` and `velocities` (…, 3). A body touches it while it is lower
-/// than `height` (metres) and slower than `speed` (m/s). `window`: a number of frames, along the first axis; each value
-/// is replaced by the majority of this many frames around it.
+/// than `height` (metres) and slower than `speed` (m/s). `window`: an odd number of frames; each value is replaced by the
+/// majority of this many frames around it. The arrays are then (…, frames, bodies, 3), such as those of
+/// `MotionLibrary.sample_windows`, or (frames, 3) for one body; every item of the axes before is filtered alone.
 ///
 /// >>> import tumble
 /// >>> tumble.features.contacts([[0.0, 0.0, 0.02]], [[0.1, 0.0, 0.0]], up="z", height=0.05, speed=0.2)
@@ -259,9 +271,15 @@ pub(crate) fn contacts<'py>(
     up: &str,
     height: f64,
     speed: f64,
-    window: Option<usize>,
+    window: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let ground: Ground = option_named(up, "up")?;
+    for (name, limit) in [("height", height), ("speed", speed)] {
+        if limit.is_nan() {
+            return Err(input(format!("{name}: it is not a number")));
+        }
+    }
+    let window = window.map(odd_window).transpose()?;
     let (shape, points) = vectors(positions, "positions")?;
     let (other, rates) = vectors(velocities, "velocities")?;
     if shape != other {
@@ -273,18 +291,19 @@ pub(crate) fn contacts<'py>(
     }
     let limits = ContactLimits { height, speed };
     let mut found = learning::contacts(&points, &rates, ground, limits);
-    if let (Some(window), [frames, ..]) = (window, &shape[..]) {
-        if window % 2 == 0 {
-            return Err(input(format!(
-                "window: {window} is even; give an odd number of frames"
-            )));
-        }
-        let bodies = found.len().checked_div(*frames).unwrap_or(0);
-        for body in 0..bodies {
-            let of_body: Vec<bool> = found.iter().skip(body).step_by(bodies).copied().collect();
-            let kept = learning::majority(&of_body, window);
-            for (frame, touches) in kept.into_iter().enumerate() {
-                found[frame * bodies + body] = touches;
+    if let Some(window) = window {
+        let (frames, bodies) = match shape[..] {
+            [.., frames, bodies] => (frames, bodies),
+            [frames] => (frames, 1),
+            [] => (1, 1),
+        };
+        for item in found.chunks_mut((frames * bodies).max(1)) {
+            for body in 0..bodies {
+                let of_body: Vec<bool> = item.iter().skip(body).step_by(bodies).copied().collect();
+                let kept = learning::majority(&of_body, window);
+                for (frame, touches) in kept.into_iter().enumerate() {
+                    item[frame * bodies + body] = touches;
+                }
             }
         }
     }

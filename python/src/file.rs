@@ -13,6 +13,7 @@ use tumble_formats::adjust::{JointOffsets, OffsetsError, UpAxis, adjust_all, set
 use tumble_formats::format::FormatOption;
 use tumble_formats::keys::Duplicates;
 use tumble_formats::kitti::open_frame_times;
+use tumble_formats::motion::Motion;
 use tumble_formats::npz::body_offsets;
 use tumble_formats::{Diagnostic, Format, Limits, Loaded, ReadOptions};
 
@@ -290,10 +291,10 @@ pub(crate) fn load_all(
     tracks: Option<&Bound<'_, PyAny>>,
     method: &str,
 ) -> PyResult<(Vec<File>, Vec<SkippedFile>)> {
-    let request = Arc::new(FileOptions {
-        shape: ClipShape::new(fps, tracks, method)?,
-        ..FileOptions::new(LoadKeywords::of_dict(keywords)?)?
-    });
+    let mut request = FileOptions::new(LoadKeywords::of_dict(keywords)?)?;
+    request.shape = ClipShape::new(fps, tracks, method)?;
+    request.options.tracks = request.shape.joints().map(<[_]>::to_vec);
+    let request = Arc::new(request);
     let (mut files, mut skipped) = (Vec::with_capacity(paths.0.len()), Vec::new());
     let mut warnings = Vec::new();
     for (chunk, paths_read) in paths.0.chunks(FILES_AT_ONCE).enumerate() {
@@ -486,6 +487,7 @@ impl FileOptions {
             bridge_gaps,
             keyframes,
             has_body_model: body_model.is_some(),
+            tracks: None,
         };
         let format = format.as_deref().map(format_named).transpose()?;
         let up: Option<UpAxis> = up.map(|axis| option_of(&axis, "up")).transpose()?;
@@ -577,11 +579,15 @@ impl FileOptions {
         let read = format.open(file, &options);
         let mut loaded = read.map_err(|diagnostic| of_diagnostic(&diagnostic))?;
         let name = file.display().to_string();
-        if let Some(offsets) = &self.offsets {
-            let of_clips = loaded.clips.iter().map(|clip| offsets.of_clip(clip));
-            let of_clips: Result<Vec<Vec<f64>>, OffsetsError> = of_clips.collect();
-            let placed = of_clips.and_then(|numbers| set_all_offsets(&mut loaded, &name, &numbers));
-            placed.map_err(|error| input(format!("offsets: {name}: {error}")))?;
+        let refuse = |fault: String| input(format!("{name}: {fault}"));
+        let are_of_selected = match (&self.offsets, loaded.clips.first()) {
+            (Some(offsets), Some(clip)) => self.shape.selects_offsets(offsets, clip),
+            _ => Ok(false),
+        };
+        let are_of_selected =
+            are_of_selected.map_err(|fault| input(format!("offsets: {name}: {fault}")))?;
+        if let (Some(offsets), false) = (&self.offsets, are_of_selected) {
+            put_offsets(&mut loaded, &name, |clip| offsets.of_clip(clip))?;
         }
         if let Some(model) = &self.body_model {
             let of_clip = |clip| body_offsets(model, clip, Limits::default());
@@ -590,6 +596,17 @@ impl FileOptions {
             let numbers = of_clips.map_err(|diagnostic| of_diagnostic(&diagnostic))?;
             let placed = set_all_offsets(&mut loaded, &name, &numbers);
             placed.map_err(|error| input(format!("body_model: {name}: {error}")))?;
+        }
+        if self.shape.joints().is_some() {
+            loaded.document = None;
+            for clip in &mut loaded.clips {
+                *clip = self.shape.selected(std::mem::take(clip)).map_err(refuse)?;
+            }
+        }
+        if let (Some(offsets), true) = (&self.offsets, are_of_selected) {
+            put_offsets(&mut loaded, &name, |clip| {
+                offsets.some_of(clip).of_clip(clip)
+            })?;
         }
         if self.scale.is_some() || self.up.is_some() {
             let factor = match (self.scale, loaded.space) {
@@ -606,12 +623,22 @@ impl FileOptions {
         if self.shape != ClipShape::default() {
             loaded.document = None;
             for clip in &mut loaded.clips {
-                let shaped = self.shape.applied(std::mem::take(clip));
-                *clip = shaped.map_err(|error| input(format!("{name}: {error}")))?;
+                *clip = self.shape.sampled(std::mem::take(clip)).map_err(refuse)?;
             }
         }
         Ok(loaded)
     }
+}
+
+/// Sets the offsets of the joints of all clips of a file.
+fn put_offsets(
+    loaded: &mut Loaded,
+    name: &str,
+    offsets: impl Fn(&Motion) -> Result<Vec<f64>, OffsetsError>,
+) -> PyResult<()> {
+    let of_clips: Result<Vec<Vec<f64>>, OffsetsError> = loaded.clips.iter().map(offsets).collect();
+    let placed = of_clips.and_then(|numbers| set_all_offsets(loaded, name, &numbers));
+    placed.map_err(|error| input(format!("offsets: {name}: {error}")))
 }
 
 /// The offsets of joints: an array in their order, or a dict by their names.

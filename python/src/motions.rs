@@ -1,5 +1,7 @@
 //! The tables behind `tumble.MotionLibrary`: clips of one skeleton, sampled at many times at once.
 
+pub(crate) mod scalars;
+
 use std::borrow::Cow;
 use std::fmt;
 use std::sync::Arc;
@@ -15,7 +17,7 @@ use tumble::crowd::{
     CrowdError, FrameStep, KeyPrecision, MotionBuilder, MotionClip, MotionStates, MotionTables,
     MotionWords,
 };
-use tumble::{Channel, Device, Encoding, Error, MatrixOrder, Method, Skeleton, VectorMethod};
+use tumble::{Channel, Device, Error, MatrixOrder, Method, Skeleton, VectorMethod};
 use tumble_formats::motion::Motion;
 use tumble_formats::sample::{ChannelMethods, MethodChoice};
 use tumble_formats::skeleton::{ClipSkeleton, OffsetSource};
@@ -27,6 +29,7 @@ use crate::engine::Engine;
 use crate::errors::{guarded, in_python, input, of_engine, warn_of};
 use crate::evaluate::write_vectors;
 use crate::options::method_named;
+use crate::output::filled;
 use crate::run::stoppable;
 use crate::samples::{joint_offsets, joint_parents};
 
@@ -323,6 +326,29 @@ pub(crate) fn of_pushed(error: CrowdError, listed: ListedClip<'_>) -> PyErr {
     }
 }
 
+/// Tables, with their spans and cells.
+type BuiltTables = (MotionTables, Vec<[u32; 4]>, Vec<[f32; 4]>);
+
+/// The tables of clips, each of which is made by `clip`.
+fn built<'a>(
+    skeleton: &Skeleton,
+    (ticks_per_second, precision): (u32, KeyPrecision),
+    clips: &'a [Clip],
+    clip: impl Fn(ListedClip<'a>) -> PyResult<MotionClip<'a>>,
+) -> PyResult<BuiltTables> {
+    let made = MotionBuilder::new(skeleton, ticks_per_second, precision);
+    let mut builder = made.map_err(of_crowd)?;
+    let engine = tumble::Engine::new(Device::Cpu).map_err(|it| of_engine(&it))?;
+    let mut listed = ListedClip::all(clips).peekable();
+    while listed.peek().is_some() {
+        let batch: Vec<ListedClip<'_>> = listed.by_ref().take(CLIPS_AT_ONCE).collect();
+        let made: PyResult<Vec<MotionClip<'_>>> = batch.iter().map(|&it| clip(it)).collect();
+        let pushed = builder.push_all(&engine, &made?);
+        pushed.map_err(|(index, error)| of_pushed(error, batch[index]))?;
+    }
+    Ok(builder.finish())
+}
+
 #[pymethods]
 impl Motions {
     /// Prepares clips by a method. All have the joints of `skeleton`, a clip or the arrays `(parents, offsets)`; `None`:
@@ -383,33 +409,15 @@ impl Motions {
                     true => whole as u32 * TICKS,
                     false => (LONGEST / longest).max(1.0) as u32,
                 };
-                let made = MotionBuilder::new(&skeleton, ticks, precision);
-                let mut builder = made.map_err(of_crowd)?;
-                let engine = tumble::Engine::new(Device::Cpu).map_err(|it| of_engine(&it))?;
-                let mut listed = ListedClip::all(&clips).peekable();
-                while listed.peek().is_some() {
-                    let batch: Vec<ListedClip<'_>> = listed.by_ref().take(CLIPS_AT_ONCE).collect();
-                    let fitted: PyResult<Vec<MotionClip<'_>>> = batch
-                        .iter()
-                        .map(|&it| motion_clip(&shared, it, method))
-                        .collect();
-                    let pushed = builder.push_all(&engine, &fitted?);
-                    pushed.map_err(|(index, error)| of_pushed(error, batch[index]))?;
-                }
-                Ok(builder.finish())
+                built(&skeleton, (ticks, precision), &clips, |listed| {
+                    motion_clip(&shared, listed, method)
+                })
             })
         })?;
-        let (tables, spans, cells) = prepared;
-        let [spans_count, cells_count] = [spans.len(), cells.len()];
-        let spans = PyArray1::from_vec(py, spans.into_flattened()).reshape([spans_count, 4])?;
-        let cells = PyArray1::from_vec(py, cells.into_flattened()).reshape([cells_count, 4])?;
         Ok(Self {
-            tables,
-            spans: spans.unbind(),
-            cells: cells.unbind(),
             unplaced,
-            joint_names,
             skipped,
+            ..Self::of_parts(py, prepared, joint_names)?
         })
     }
 
@@ -463,36 +471,33 @@ impl Motions {
         })
     }
 
-    /// Everything, as arrays.
-    fn arrays<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let words = self.tables.words();
-        let found = PyDict::new(py);
-        fn put<const N: usize>(
-            found: &Bound<'_, PyDict>,
-            name: &str,
-            words: Vec<[u32; N]>,
-        ) -> PyResult<()> {
-            let count = words.len();
-            let flat = PyArray1::from_vec(found.py(), words.into_flattened());
-            found.set_item(name, flat.reshape([count, N])?)
-        }
-        put(&found, "clips", words.clips)?;
-        put(&found, "bases", words.bases)?;
-        put(&found, "channels", words.channels)?;
-        put(&found, "links", words.links)?;
-        put(
-            &found,
-            "sizes",
-            vec![[words.joint_count as u32, words.ticks_per_second]],
-        )?;
-        found.set_item("spans", &self.spans)?;
-        found.set_item("cells", &self.cells)?;
-        Ok(found)
+    /// Everything, as arrays; with `clips`, only of these clips, in this order.
+    #[pyo3(signature = (clips=None))]
+    fn arrays<'py>(
+        &self,
+        py: Python<'py>,
+        clips: Option<ListArgument<usize>>,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let Some(ListArgument(clips)) = clips else {
+            let parts = [self.spans.bind(py).as_any(), self.cells.bind(py).as_any()];
+            return arrays_of(py, self.tables.words(), parts);
+        };
+        let (tables, spans, cells) = self.with_parts(py, |tables, parts| {
+            guarded(|| tables.select(parts, &clips).map_err(of_crowd))
+        })?;
+        let (spans, cells) = (spans_array(py, spans)?, cells_array(py, cells)?);
+        arrays_of(py, tables.words(), [spans.as_any(), cells.as_any()])
     }
 
     /// Number of clips.
     fn __len__(&self) -> usize {
         self.tables.clip_count()
+    }
+
+    /// Number of ticks in a second.
+    #[getter]
+    fn ticks_per_second(&self) -> u32 {
+        self.tables.ticks_per_second()
     }
 
     /// Number of joints.
@@ -578,6 +583,22 @@ impl Motions {
 }
 
 impl Motions {
+    /// Those of tables, all of whose clips have positions.
+    fn of_parts(
+        py: Python<'_>,
+        (tables, spans, cells): BuiltTables,
+        joint_names: Vec<String>,
+    ) -> PyResult<Self> {
+        Ok(Self {
+            tables,
+            spans: spans_array(py, spans)?.unbind(),
+            cells: cells_array(py, cells)?.unbind(),
+            unplaced: Vec::new(),
+            joint_names,
+            skipped: Vec::new(),
+        })
+    }
+
     /// Does work with the tables, without the interpreter's lock.
     pub(crate) fn with_parts<T: Send>(
         &self,
@@ -661,9 +682,10 @@ impl Motions {
 }
 
 /// Fills an array with rotations in another representation: "matrix" (…, 3, 3), "6d" (…, 6), the first two columns, or
-/// "rotvec" (…, 3), of `rotations`, (…, 4), x y z w.
+/// "rotvec" (…, 3), of `rotations`, (…, 4), x y z w. Matrices are computed on the threads of the engine.
 #[pyfunction]
 pub(crate) fn represent(
+    engine: &Bound<'_, Engine>,
     rotations: &Bound<'_, PyArrayDyn<f32>>,
     kind: &str,
     out: &Bound<'_, PyArrayDyn<f32>>,
@@ -671,23 +693,17 @@ pub(crate) fn represent(
     if kind == "rotvec" {
         return write_vectors(rotations, out);
     }
-    let (read, mut written) = (rotations.try_readonly()?, out.try_readwrite()?);
-    let quaternions = read.as_slice()?.as_chunks().0;
-    let numbers = written.as_slice_mut()?;
-    let encode = |numbers: &mut [f32]| {
-        let encoding = Encoding::Matrix3x3(MatrixOrder::RowMajor);
-        let encoded = encoding.encode(quaternions, bytemuck::cast_slice_mut(numbers));
-        encoded.map_err(|error| input(error.to_string()))
+    let order = match kind {
+        "matrix" => MatrixOrder::RowMajor,
+        _ => MatrixOrder::ColumnMajor,
     };
-    if kind == "matrix" {
-        return encode(numbers);
-    }
-    let mut matrices = vec![0.0; 9 * quaternions.len()];
-    encode(&mut matrices)?;
-    for (six, matrix) in numbers.chunks_exact_mut(6).zip(matrices.chunks_exact(9)) {
-        six.copy_from_slice(&[0, 3, 6, 1, 4, 7].map(|index| matrix[index]));
-    }
-    Ok(())
+    let read = rotations.try_readonly()?;
+    let quaternions = read.as_slice()?.as_chunks().0;
+    let engine = engine.get().engine_for(1)?;
+    filled(out, |numbers| {
+        let encoded = engine.matrices_into(quaternions, order, numbers);
+        encoded.map_err(|error| of_engine(&error))
+    })
 }
 
 /// The memory of an output as rows, as many as there are joints.
@@ -705,6 +721,43 @@ fn rows<'a, const N: usize>(
         )));
     }
     Ok(array.as_slice_mut()?.as_chunks_mut().0)
+}
+
+fn spans_array(py: Python<'_>, spans: Vec<[u32; 4]>) -> PyResult<Bound<'_, PyArray2<u32>>> {
+    let count = spans.len();
+    PyArray1::from_vec(py, spans.into_flattened()).reshape([count, 4])
+}
+
+fn cells_array(py: Python<'_>, cells: Vec<[f32; 4]>) -> PyResult<Bound<'_, PyArray2<f32>>> {
+    let count = cells.len();
+    PyArray1::from_vec(py, cells.into_flattened()).reshape([count, 4])
+}
+
+/// Small tables, and the spans and cells that belong to them, as arrays by their names.
+fn arrays_of<'py>(
+    py: Python<'py>,
+    words: MotionWords,
+    [spans, cells]: [&Bound<'py, PyAny>; 2],
+) -> PyResult<Bound<'py, PyDict>> {
+    fn put<const N: usize>(
+        found: &Bound<'_, PyDict>,
+        name: &str,
+        words: Vec<[u32; N]>,
+    ) -> PyResult<()> {
+        let count = words.len();
+        let flat = PyArray1::from_vec(found.py(), words.into_flattened());
+        found.set_item(name, flat.reshape([count, N])?)
+    }
+    let found = PyDict::new(py);
+    put(&found, "clips", words.clips)?;
+    put(&found, "bases", words.bases)?;
+    put(&found, "channels", words.channels)?;
+    put(&found, "links", words.links)?;
+    let sizes = [words.joint_count as u32, words.ticks_per_second];
+    put(&found, "sizes", vec![sizes])?;
+    found.set_item("spans", spans)?;
+    found.set_item("cells", cells)?;
+    Ok(found)
 }
 
 fn array<'py>(arrays: &Bound<'py, PyDict>, name: &str) -> PyResult<Bound<'py, PyAny>> {

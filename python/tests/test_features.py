@@ -138,3 +138,27 @@ def test_clips_stay_in_place_or_are_carried():
     np.testing.assert_allclose(points, positions, atol=2e-6)
     with pytest.raises(tumble.InputError, match="no joint is called `head`"):
         clip.root_motion("in-place", joint="head")
+
+
+def test_contacts_are_filtered_along_the_time_of_each_item():
+    """Of windows of a batch, as `sample_windows` gives them: each as if it were alone."""
+    rng = np.random.default_rng(5)
+    positions, velocities = rng.uniform(0, 0.2, (3, 4, 9, 2, 3)), rng.uniform(0, 0.5, (3, 4, 9, 2, 3))
+    limits = {"up": "z", "height": 0.1, "speed": 0.5, "window": 3}
+    found = features.contacts(positions, velocities, **limits)
+    touching = features.contacts(positions, velocities, up="z", height=0.1, speed=0.5)
+    middle = touching[..., :-2, :].astype(int) + touching[..., 1:-1, :] + touching[..., 2:, :]
+    np.testing.assert_array_equal(found[..., 1:-1, :], middle >= 2)
+    for item in np.ndindex(3, 4):
+        np.testing.assert_array_equal(found[item], features.contacts(positions[item], velocities[item], **limits))
+        one = features.contacts(positions[item][:, 1], velocities[item][:, 1], **limits)
+        np.testing.assert_array_equal(found[item][:, 1], one)
+    for wrong, error, words in [
+        ({"window": 4}, tumble.InputError, "window: 4 is even"),
+        ({"window": -1}, ValueError, "window: -1"),
+        ({"window": 2.5}, TypeError, "window: 2.5"),
+        ({"window": True}, TypeError, "window: True"),
+        ({"height": float("nan")}, ValueError, "height: it is not a number"),
+    ]:
+        with pytest.raises(error, match=words):
+            features.contacts(positions, velocities, **{**limits, **wrong})

@@ -553,6 +553,245 @@ def test_packed_libraries_are_small_and_within_their_bound(rng, tmp_path):
     assert (tmp_path / "packed.npz").stat().st_size < 12 * 22 * frames
 
 
+def test_offsets_are_those_of_the_selected_joints_or_of_all(tmp_path):
+    body(tmp_path / "a_poses.npz", 13)
+    path = tmp_path / "a_poses.npz"
+    offsets = np.random.default_rng(8).normal(size=(52, 3))
+    names = tumble.load(path).clip.names
+    tracks = ["left_hip", "pelvis", "left_knee"]
+    rows = [names.index(name) for name in tracks]
+    by_file = tumble.MotionLibrary.load(path, tracks=tracks, offsets=offsets).sample(0, [0.0, 0.05])
+    by_name = dict(zip(names, offsets.tolist()))
+    for given in (offsets[rows], by_name, {name: by_name[name] for name in tracks}):
+        found = tumble.MotionLibrary.load(path, tracks=tracks, offsets=given).sample(0, [0.0, 0.05])
+        np.testing.assert_array_equal(found.positions, by_file.positions)
+    turned = Rotation.from_quat(by_file.world_rotations[:, 1].astype(float)).apply(offsets[rows[0]])
+    np.testing.assert_allclose(by_file.positions[:, 0], by_file.positions[:, 1] + turned, atol=1e-5)
+    for given, words in [
+        (offsets[:5], "offsets: .*a_poses.npz: 5 offsets for 3 of 52 joints"),
+        ({"pelvis": [0, 0, 0], "left_hip": [0, 0, 0]}, "offsets: .*left_knee"),
+        ({**by_name, "left_hop": [0, 0, 0]}, "there is no joint `left_hop`; .*did you mean `left_hip`"),
+    ]:
+        with pytest.raises(tumble.InputError, match=words):
+            tumble.MotionLibrary.load(path, tracks=tracks, offsets=given)
+    backwards = list(range(51, -1, -1))
+    with pytest.raises(tumble.InputError, match="all 52 joints in another order than the file"):
+        tumble.MotionLibrary.load(path, tracks=backwards, offsets=offsets)
+    again = tumble.MotionLibrary.load(path, tracks=backwards, offsets=by_name).sample(0, [0.0, 0.05])
+    whole = tumble.MotionLibrary.load(path, tracks=range(52), offsets=offsets).sample(0, [0.0, 0.05])
+    np.testing.assert_allclose(again.positions[:, ::-1], whole.positions, atol=1e-6)
+
+
+def test_joints_that_are_left_out_may_be_broken(tmp_path):
+    poses, trans = body(tmp_path / "good.npz", 20)
+    poses[7, 30] = np.nan
+    broken = poses.reshape(20, -1)
+    np.savez(tmp_path / "broken.npz", poses=broken, trans=trans, gender="neutral", mocap_framerate=120.0)
+    tracks = ["pelvis", "left_hip", "left_knee"]
+    with pytest.raises(tumble.InputError, match=r"poses.*\[7"):
+        tumble.MotionLibrary.load(tmp_path / "broken.npz", offsets=np.ones((52, 3)))
+    libraries = [
+        tumble.MotionLibrary.load(tmp_path / name, tracks=chosen, offsets=np.ones((52, 3)), fps=60)
+        for name in ("good.npz", "broken.npz")
+        for chosen in (tracks, [0, 1, 4])
+    ]
+    states = [library.sample(0, [0.0, 0.06, 0.1]) for library in libraries]
+    assert all(state == states[0] for state in states)
+    trans[3, 1] = np.inf
+    np.savez(tmp_path / "root.npz", poses=broken, trans=trans, gender="neutral", mocap_framerate=120.0)
+    with pytest.raises(tumble.InputError, match="trans.*not finite"):
+        tumble.MotionLibrary.load(tmp_path / "root.npz", tracks=tracks, offsets=np.ones((3, 3)))
+
+
+def test_a_shard_is_the_same_however_it_is_made(tmp_path):
+    """The files of a process, and no others, in the order of joints of all."""
+    counts = [20, 30, 40, 50, 60]
+    for index, count in enumerate(counts):
+        tumble.save(tmp_path / f"{index}.npz", wave(count, 30), fps=30, method="slerp")
+    (tmp_path / "1.npz").write_bytes(b"PK nothing")
+    # Its joints have another order.
+    first = wave(20, 30)
+    order = [4, 0, 1, 2, 3, 5, 6]
+    shuffled = tumble.Clip(
+        first.times(0),
+        np.stack([first.keys(joint) for joint in order]),
+        layout="track",
+        names=[first.names[joint] for joint in order],
+        parents=[None if PARENTS[joint] is None else order.index(PARENTS[joint]) for joint in order],
+        offsets=OFFSETS[order],
+    )
+    tumble.save(tmp_path / "0.npz", shuffled, fps=30, method="slerp")
+    pattern = str(tmp_path / "*.npz")
+    whole = tumble.MotionLibrary.load(pattern, on_error="skip")
+    assert [path.rsplit("/")[-1] for path in whole.paths] == ["0.npz", "2.npz", "3.npz", "4.npz"]
+    whole.save(tmp_path / "whole.motions")
+    opened = tumble.MotionLibrary.open(tmp_path / "whole.motions")
+    for rank, names in [(0, ["0", "2", "4"]), (1, ["3"])]:
+        parts = [
+            whole.shard(rank, 2),
+            tumble.MotionLibrary.load(pattern, on_error="skip", shard=(rank, 2)),
+            opened.shard(rank, 2),
+            pickle.loads(pickle.dumps(opened)).shard(rank, 2),
+            pickle.loads(pickle.dumps(opened.shard(rank, 2))),
+            pickle.loads(pickle.dumps(whole.shard(rank, 2))),
+        ]
+        parts[0].save(tmp_path / "part.motions")
+        parts.append(tumble.MotionLibrary.open(tmp_path / "part.motions"))
+        ids, times = np.arange(len(names)), np.linspace(0.1, 0.6, len(names))
+        for part in parts:
+            assert part.names == names and part.joint_names == whole.joint_names
+            assert [path.rsplit("/")[-1] for path in part.paths] == [f"{name}.npz" for name in names]
+            assert part.sample(ids, times) == parts[0].sample(ids, times)
+            if rank == 0:
+                assert part.shard(0, 2).names == ["0", "4"] and part.shard(1, 2).names == ["2"]
+        skipped = [[one.path.rsplit("/")[-1] for one in part.skipped] for part in parts[:2]]
+        assert skipped == [["1.npz"] if rank == 1 else []] * 2
+    for made in (lambda: whole.shard(8, 9), lambda: tumble.MotionLibrary.load(pattern, shard=(8, 9))):
+        with pytest.raises(tumble.InputError, match="shard: none of the"):
+            made()
+
+
+def test_a_shard_is_written_without_the_other_clips(tmp_path):
+    library = tumble.MotionLibrary([wave(count, 30) for count in (500, 20, 600)], names=list("abc"))
+    part = library.shard(1, 3)
+    for packed in (False, True):
+        whole = tumble.MotionLibrary([wave(count, 30) for count in (500, 20, 600)], packed=packed)
+        small = whole.shard(1, 3)
+        small.save(tmp_path / "small.npz")
+        whole.save(tmp_path / "whole.npz")
+        assert (tmp_path / "small.npz").stat().st_size < (tmp_path / "whole.npz").stat().st_size / 4
+        assert len(pickle.dumps(small)) < len(pickle.dumps(whole)) / 4
+        again = tumble.MotionLibrary.open(tmp_path / "small.npz")
+        assert again.sample(0, [0.1, 0.4]) == whole.sample(1, [0.1, 0.4])
+        assert again.nbytes < whole.nbytes / 10
+    unplaced = tumble.Clip(np.arange(3) / 30, np.tile([0, 0, 0, 1.0], (2, 3, 1)), layout="track", parents=[None, 0])
+    mixed = tumble.MotionLibrary([unplaced, tumble.Clip([0.0, 1.0], np.tile([0, 0, 0, 1.0], (2, 2, 1)), layout="track", parents=[None, 0], offsets=[[0, 0, 0], [1, 0, 0]])])
+    placed = pickle.loads(pickle.dumps(mixed.shard(1, 2)))
+    assert placed.sample(0, 0.5).positions[1].tolist() == [1, 0, 0]
+    with pytest.raises(tumble.InputError, match="offsets"):
+        pickle.loads(pickle.dumps(mixed.shard(0, 2))).sample(0, 0.5)
+    assert part.names == ["b"]
+
+
+def test_numbers_of_another_meaning_are_refused():
+    library = tumble.MotionLibrary([wave(31, 30), wave(91, 30)], names=["short", "long"])
+    rng = np.random.default_rng(3)
+    uneven = tumble.MotionLibrary([tumble.Clip([0.0, 0.1, 0.7], np.tile([0, 0, 0, 1.0], (1, 3, 1)), parents=[None])], names=["uneven"])
+    mask = np.array([True, False])
+    for call, error, words in [
+        (lambda: library.sample(mask, 0.0), ValueError, "clip_ids: a mask .* np.flatnonzero"),
+        (lambda: library.sample_times(mask, rng), ValueError, "clip_ids: a mask"),
+        (lambda: library.sample_times([0.5], rng), ValueError, "clip_ids: their type is float64, such as .*0.5"),
+        (lambda: library.sample_windows(mask, 0.0, 3, 30), ValueError, "clip_ids: a mask"),
+        (lambda: library.sample(np.array([2**63], np.uint64), 0.0), ValueError, "there is no clip 9223372036854775808"),
+        (lambda: library.sample(0, np.array([1], "timedelta64[s]")), TypeError, "times: .* give seconds, as numbers, such as durations"),
+        (lambda: library.sample(0, np.datetime64("2020-01-01")), TypeError, "times: their type is datetime64"),
+        (lambda: library.sample(0, mask), TypeError, "times: their type is bool"),
+        (lambda: library.sample(0, ["0.5"]), TypeError, "times: their type is <U3, such as .*0.5"),
+        (lambda: library.sample(0, None), TypeError, "times: their type is object, such as None"),
+        (lambda: library.sample(0, [1j]), TypeError, "times: their type is complex128"),
+        (lambda: library.sample_windows(0, mask, 3, 30), TypeError, "starts: their type is bool"),
+        (lambda: library.sample_windows(0, 0.0, 2.5, 30), TypeError, "count: 2.5; give a number of states"),
+        (lambda: library.sample_windows(0, 0.0, True, 30), TypeError, "count: True"),
+        (lambda: library.sample_windows(0, 0.0, -1, 30), ValueError, "count: -1"),
+        (lambda: library.sample_windows(0, 0.0, 3, "30"), TypeError, "fps: '30'; give frames a second"),
+        (lambda: library.sample_windows(0, 0.0, 3, np.inf), ValueError, "fps: inf is not finite"),
+        (lambda: library.draw(2.5, rng), TypeError, "count: 2.5; give a number of clips"),
+        (lambda: library.draw(2, rng, window=np.timedelta64(1, "s")), TypeError, "window: "),
+        (lambda: library.draw(2, rng, weights="ab"), TypeError, "weights: their type is <U2"),
+        (lambda: library.draw(2, 5), TypeError, "rng: it is of the type int; give a generator"),
+        (lambda: library.shard(True, 2), TypeError, "shard: True"),
+        (lambda: library.shard(0.5, 2), TypeError, "shard: 0.5"),
+        (lambda: tumble.MotionLibrary.load("x.npz", shard=2), TypeError, r"shard: 2; give \(rank, processes\)"),
+        (lambda: library.sample(0, 0.0, arrays="rotations"), TypeError, r'give a list, such as \["rotations"\]'),
+        (lambda: library.sample(0, 0.0, out=np.zeros(3)), TypeError, "out: it is of the type ndarray; give a MotionState"),
+        (lambda: uneven.sample(0, 0.0, finite=True), ValueError, r"finite: clip 0 \(uneven\) has no rate"),
+        (lambda: tumble.MotionLibrary([wave(3, 30)], device="auto"), ValueError, 'device: with "auto"'),
+        (lambda: tumble.MotionLibrary([wave(3, 30)], device=True), TypeError, "device: True"),
+        (lambda: tumble.MotionLibrary([wave(3, 30)], device=1.0), TypeError, "device: 1.0"),
+        (lambda: tumble.Engine("cpu", memory=2.5), TypeError, "memory: 2.5: give bytes"),
+        (lambda: tumble.Engine("cpu", memory=-1), ValueError, "memory: -1"),
+        (lambda: tumble.Engine("cpu", threads=True), TypeError, "threads: True"),
+    ]:
+        with pytest.raises(error, match=words):
+            call()
+    from fractions import Fraction
+
+    found = library.sample([0], [Fraction(1, 2)])
+    assert found == library.sample(np.array([0], np.uint8), np.float32(0.5)[None])
+    assert library.sample_windows(0, 0.0, np.int64(3), Fraction(30)) == library.sample_windows([0][0], 0, 3, 30)
+
+
+def arm(frames, rate, names=("shoulder", "elbow", "wrist", "grip"), seed=0, start=0.0):
+    """A robot whose gripper has other key times than its joints."""
+    rng = np.random.default_rng(seed)
+    times = start + np.arange(frames) / rate
+    scalars = {name: (times, np.cumsum(0.1 * rng.normal(size=frames))) for name in names}
+    scalars[names[-1]] = (times[::3], rng.normal(size=len(times[::3])))
+    keys = np.stack([smooth(rng, frames)])
+    return tumble.Clip(times, keys, parents=[None], layout="track", offsets=[[0, 0, 0]], scalars=scalars)
+
+
+def test_scalars_are_columns_of_a_library(tmp_path, rng):
+    clips = [arm(31, 30), arm(91, 30, seed=1, start=2.0)]
+    for method in ("slerp", "bessel-overhauser"):
+        library = tumble.MotionLibrary(clips, method=method)
+        assert library.dof_names == ["shoulder", "elbow", "wrist", "grip"] and library.contact_names == []
+        ids = rng.integers(0, 2, (3, 5))
+        times = rng.uniform(-0.1, 1.1, (3, 5)) * library.lengths[ids]
+        state = library.sample(ids, times)
+        assert state.dofs.shape == (3, 5, 4) and state.contacts is None
+        for at in np.ndindex(3, 5):
+            clip = clips[ids[at]]
+            first, last = clip.span
+            time = np.clip(first + times[at], first, last)
+            expected = tumble.Engine("cpu").scalars(clip, at=[time], method=method)
+            np.testing.assert_allclose(state.dofs[at], expected[:, 0], atol=2e-6)
+        step = 1e-3
+        inside = library.sample_windows([0, 1], [0.404, 0.411], 3, 1 / step, arrays=["dofs", "dof_velocities"])
+        rate = (inside.dofs[:, 2] - inside.dofs[:, 0]) / (2 * step)
+        np.testing.assert_allclose(inside.dof_velocities[:, 1], rate, atol=0.01)
+        only = library.sample(ids, times, arrays=["dofs"])
+        assert only.rotations is None and np.array_equal(only.dofs, state.dofs)
+        memory = only.dofs
+        assert library.sample(ids, times + 0.1, out=only).dofs is memory
+        assert not np.array_equal(memory, state.dofs)
+        library.save(tmp_path / "arm.npz")
+        opened = tumble.MotionLibrary.open(tmp_path / "arm.npz")
+        assert opened.dof_names == library.dof_names and opened.sample(ids, times) == state
+        for part in (library.shard(1, 2), opened.shard(1, 2), pickle.loads(pickle.dumps(library.shard(1, 2)))):
+            assert part.sample(0, [0.5, 2.1]) == library.sample(1, [0.5, 2.1])
+    finite = tumble.MotionLibrary(clips).sample(0, 0.51, finite=True)
+    frames = tumble.MotionLibrary(clips).sample(0, np.array([15, 16]) / 30)
+    np.testing.assert_allclose(finite.dof_velocities, 30 * (frames.dofs[1] - frames.dofs[0]), atol=1e-4)
+
+
+def test_contacts_of_files_are_steps(tmp_path):
+    rows = ["time,qx,qy,qz,qw,knee.scalar_angle,foot.scalar_contact"]
+    rows += [f"{0.1 * frame},0,0,0,1,{0.2 * frame},{frame % 2}" for frame in range(6)]
+    (tmp_path / "walk.csv").write_text("\n".join(rows) + "\n")
+    library = tumble.MotionLibrary.load(tmp_path / "walk.csv", skeleton=([None], [[0, 0, 0]]))
+    assert (library.dof_names, library.contact_names) == (["knee"], ["foot"])
+    state = library.sample(0, [0.05, 0.1, 0.19, 0.2, 0.5])
+    assert state.contacts[:, 0].tolist() == [0, 1, 1, 0, 1]
+    np.testing.assert_allclose(state.dofs[:, 0], [0.1, 0.2, 0.38, 0.4, 1.0], atol=1e-6)
+
+
+def test_scalars_that_only_some_clips_have_are_no_columns():
+    other = arm(20, 30, names=("shoulder", "elbow", "ankle", "grip"))
+    library = tumble.MotionLibrary([arm(31, 30), other])
+    assert library.dof_names == [] and library.sample(0, 0.5).dofs is None
+    with pytest.raises(tumble.InputError, match=r"the library has no dofs: clips\[1\] has no scalar `wrist`"):
+        library.sample(0, 0.5, arrays=["dofs"])
+    with pytest.raises(tumble.InputError, match="the library has no contacts$"):
+        library.sample(0, 0.5, out=tumble.MotionState(contacts=np.zeros((1,), np.float32)))
+    # By name, in the order of the first clip.
+    shuffled = arm(20, 30, names=("elbow", "wrist", "shoulder", "grip"), seed=3)
+    both = tumble.MotionLibrary([arm(31, 30), shuffled]).sample(1, 0.5)
+    alone = tumble.MotionLibrary([shuffled]).sample(0, 0.5)
+    np.testing.assert_array_equal(both.dofs, alone.dofs[[2, 0, 1, 3]])
+
+
 def test_the_table_of_loaders_is_what_the_script_prints():
     done = subprocess.run(
         [sys.executable, str(ROOT / "python/examples/loaders.py")], capture_output=True, text=True, timeout=60

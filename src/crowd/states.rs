@@ -14,6 +14,7 @@ use crate::crowd_error::CrowdError;
 use crate::engine::Engine;
 use crate::math::canonical::canonical;
 use crate::math::quaternion::{cross3, dot, product, scaled, sum};
+use crate::memory::reserved;
 use crate::shader::{
     CHANNELS, CrowdBase, CrowdChannel, CrowdClip, CrowdLink, CrowdPosition, CrowdSpan, FORM_ARC,
     FORM_CONSTANT, FORM_CUBIC, FORM_KEYS, FORM_LINE, FORM_PACKED, FORM_POLYNOMIAL, ON_KEY, POWERS,
@@ -82,6 +83,9 @@ pub struct MotionTables {
     /// The expected numbers of spans and cells.
     sizes: (usize, usize),
 }
+
+/// Tables, with the spans and cells that belong to them.
+type SelectedTables = (MotionTables, Vec<[u32; 4]>, Vec<[f32; 4]>);
 
 /// The small tables of [`MotionTables`] as 32-bit words, for files.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
@@ -186,21 +190,7 @@ impl MotionTables {
                 let Some(base) = bases.get((channel.form_and_base & 0x00ff_ffff) as usize) else {
                     return false;
                 };
-                let last = (base.count as usize - 1) * channel.count as usize;
-                let constants = constants_of(form);
-                let end = match form {
-                    FORM_CONSTANT => channel.first as usize,
-                    FORM_PACKED => (channel.first as usize + last) / 2,
-                    _ => {
-                        let behind = (constants - 1) * channel.count as usize;
-                        channel.first as usize + last * constants + behind
-                    }
-                };
-                let base_spans = &spans[base.first as usize..][..base.count as usize];
-                let has_keys = form != FORM_CONSTANT
-                    && !keeps_keys(form)
-                    && base_spans.iter().any(|span| span.start & ON_KEY != 0);
-                let keys = channel.keys as usize + last;
+                let used = ChannelCells::of(channel, base, spans);
                 // Constants of another form would be read beyond their end.
                 let is_of_kind = match index_of_kind {
                     0 => matches!(
@@ -209,7 +199,7 @@ impl MotionTables {
                     ),
                     _ => matches!(form, FORM_CONSTANT | FORM_CUBIC | FORM_LINE),
                 };
-                is_of_kind && end < cells && (!has_keys || keys < cells)
+                is_of_kind && used.all().all(|range| range.end <= cells)
             };
             let channels = &self.channels[index * each..][..each];
             clip.bases > 0 && clip.period > 0 && channels.iter().enumerate().all(is_sound_channel)
@@ -220,6 +210,106 @@ impl MotionTables {
             && self.bases.iter().all(is_sound_base)
             && self.links.iter().all(&mut is_sound_link)
             && self.clips.iter().enumerate().all(is_sound_clip)
+    }
+
+    /// The tables of some clips alone, each once, in this order, with their spans and cells. They give the same states.
+    ///
+    /// # Errors
+    /// When a clip does not exist or is listed twice, the spans and cells do not belong to the tables, the tables are not those that a
+    /// [`MotionBuilder`](crate::crowd::MotionBuilder) makes, or there is not enough memory.
+    pub fn select(
+        &self,
+        (spans, cells): (&[[u32; 4]], &[[f32; 4]]),
+        clips: &[usize],
+    ) -> Result<SelectedTables, CrowdError> {
+        const PURPOSE: &str = "some clips of a motion library";
+        self.check_parts((spans, cells))?;
+        let all_spans: &[CrowdSpan] = bytemuck::cast_slice(spans);
+        let each = self.joints * CHANNELS as usize;
+        let bases_of =
+            |clip: &CrowdClip| &self.bases[clip.first_base as usize..][..clip.bases as usize];
+        let used = |channel: &CrowdChannel, bases: &[CrowdBase]| {
+            let base = &bases[(channel.form_and_base & 0x00ff_ffff) as usize];
+            ChannelCells::of(channel, base, all_spans)
+        };
+        // A builder adds one clip after another, so that the spans and cells of a clip lie side by side.
+        let mut ranges = Vec::with_capacity(clips.len());
+        for &index in clips {
+            let clip = self.clips.get(index).ok_or(CrowdError::Missing {
+                subject: "clip",
+                index,
+                count: self.clips.len(),
+            })?;
+            let (bases, channels) = (bases_of(clip), &self.channels[index * each..][..each]);
+            let of_base =
+                |base: &CrowdBase| base.first as usize..(base.first + base.count) as usize;
+            let of_channels = channels.iter().flat_map(|channel| {
+                let cells = used(channel, bases);
+                [Some(cells.constants), cells.keys].into_iter().flatten()
+            });
+            ranges.push((
+                index,
+                around(bases.iter().map(of_base)),
+                around(of_channels),
+            ));
+        }
+        let span_count: usize = ranges.iter().map(|(_, spans, _)| spans.len()).sum();
+        let cell_count: usize = ranges.iter().map(|(_, _, cells)| cells.len()).sum();
+        // Clips of a file that share their cells would take more memory than the file.
+        if span_count > spans.len() || cell_count > cells.len() {
+            return Err(CrowdError::BrokenTables);
+        }
+        let mut found_spans = reserved(span_count, PURPOSE)?;
+        let mut found_cells = reserved(cell_count + 1, PURPOSE)?;
+        found_cells.push([0.0; 4]); // kernels use the first cell as 0
+        let mut found = Self {
+            clips: Vec::new(),
+            bases: Vec::new(),
+            channels: Vec::new(),
+            links: self.links.clone(),
+            runs: Vec::new(),
+            joints: self.joints,
+            ticks_per_second: self.ticks_per_second,
+            sizes: (span_count, cell_count + 1),
+        };
+        for (index, span_range, cell_range) in ranges {
+            let clip = &self.clips[index];
+            let bases = bases_of(clip);
+            let first_span = found_spans.len();
+            let first_cell = found_cells.len();
+            let moved = |first: u32, packed: usize| {
+                (first as usize + packed * first_cell - packed * cell_range.start) as u32
+            };
+            found
+                .channels
+                .extend(self.channels[index * each..][..each].iter().map(|channel| {
+                    let packed = match channel.form_and_base >> 24 {
+                        FORM_PACKED => 2,
+                        _ => 1,
+                    };
+                    let first = moved(channel.first, packed);
+                    CrowdChannel {
+                        first,
+                        keys: match used(channel, bases).keys {
+                            Some(_) => moved(channel.keys, 1),
+                            None => first,
+                        },
+                        ..*channel
+                    }
+                }));
+            found.clips.push(CrowdClip {
+                first_base: found.bases.len() as u32,
+                ..*clip
+            });
+            found.bases.extend(bases.iter().map(|base| CrowdBase {
+                first: (base.first as usize + first_span - span_range.start) as u32,
+                ..*base
+            }));
+            found.runs.push(self.runs[index].clone());
+            found_spans.extend_from_slice(&spans[span_range]);
+            found_cells.extend_from_slice(&cells[cell_range]);
+        }
+        Ok((found, found_spans, found_cells))
     }
 
     /// The small tables as words.
@@ -360,6 +450,49 @@ impl MotionTables {
         let work = || (tasks.into_par_iter()).try_for_each_init(StateScratch::default, task);
         engine.machine.threads().run(work)?
     }
+}
+
+/// The cells that a channel reads.
+struct ChannelCells {
+    constants: Range<usize>,
+    /// The keys beside the constants, if it has any.
+    keys: Option<Range<usize>>,
+}
+
+impl ChannelCells {
+    /// Those of a channel with a time base, whose spans exist.
+    fn of(channel: &CrowdChannel, base: &CrowdBase, spans: &[CrowdSpan]) -> Self {
+        let form = channel.form_and_base >> 24;
+        let (first, count) = (channel.first as usize, channel.count as usize);
+        let last = (base.count as usize - 1) * count;
+        let constants = match form {
+            FORM_CONSTANT => first..first + 1,
+            FORM_PACKED => first / 2..(first + last) / 2 + 1,
+            _ => {
+                let constants = constants_of(form);
+                first..first + last * constants + (constants - 1) * count + 1
+            }
+        };
+        let base_spans = &spans[base.first as usize..][..base.count as usize];
+        let has_keys = form != FORM_CONSTANT
+            && !keeps_keys(form)
+            && base_spans.iter().any(|span| span.start & ON_KEY != 0);
+        let keys = channel.keys as usize;
+        Self {
+            constants,
+            keys: has_keys.then_some(keys..keys + last + 1),
+        }
+    }
+
+    fn all(&self) -> impl Iterator<Item = &Range<usize>> {
+        [&self.constants].into_iter().chain(&self.keys)
+    }
+}
+
+/// The smallest range with all of these in it.
+fn around(ranges: impl Iterator<Item = Range<usize>>) -> Range<usize> {
+    let both = |a: Range<usize>, b: Range<usize>| a.start.min(b.start)..a.end.max(b.end);
+    ranges.reduce(both).unwrap_or_default()
 }
 
 /// Refuses more or fewer steps than instances.

@@ -136,16 +136,19 @@ impl ResidentMotions {
             cast_slice(source.links),
         ];
         let bytes = tables.iter().map(|table| table.len() as u64).sum();
-        let memory = engine.device.physical.info.device_local_memory;
-        let limit = engine
-            .clip_bytes
-            .map_or(memory, |budget| memory.min(budget as u64));
+        let (subject, limit) = (SUBJECT, engine.device.physical.info.device_local_memory);
         if bytes > limit {
-            let subject = SUBJECT;
             return Err(VulkanError::TooLarge {
                 subject,
                 bytes,
                 limit,
+            });
+        }
+        if let Some(budget) = engine.budget.filter(|budget| bytes > budget / 2) {
+            return Err(VulkanError::OverBudget {
+                subject,
+                bytes,
+                budget,
             });
         }
         let table = |bytes: &[u8]| {

@@ -199,6 +199,20 @@ pub enum VulkanError {
         /// The missing capability.
         lacks: &'static str,
     },
+    /// Something that stays on the device would exceed the engine's memory budget
+    /// ([`EngineOptions::memory`](crate::EngineOptions::memory)), half of which is for results.
+    #[error(
+        "{subject} needs {bytes} bytes; the memory budget of the engine is {budget} bytes, of which half is for results: \
+         set a budget of at least {}, or use the CPU for this set", bytes.saturating_mul(2)
+    )]
+    OverBudget {
+        /// The contents.
+        subject: &'static str,
+        /// The required size, bytes.
+        bytes: u64,
+        /// The budget, bytes.
+        budget: u64,
+    },
     /// A buffer would exceed the device's limits.
     #[error(
         "{subject} needs {bytes} bytes, over the device's limit of {limit}; use the CPU for this set"

@@ -169,9 +169,12 @@ fn requests_that_cannot_be_met_are_refused() {
         options.memory = Some(2 * motions.bytes() - 2);
         let small = Engine::with_options(device, &options).unwrap();
         let refused = DeviceMotions::new(&small, &tables, parts).unwrap_err();
-        let CrowdError::Vulkan(VulkanError::TooLarge { bytes, limit, .. }) = refused else {
+        let message = refused.to_string();
+        let CrowdError::Vulkan(VulkanError::OverBudget { bytes, budget, .. }) = refused else {
             panic!("{refused}")
         };
-        assert_eq!((bytes, limit), (motions.bytes(), motions.bytes() - 1));
+        assert_eq!((bytes, budget), (motions.bytes(), 2 * motions.bytes() - 2));
+        let enough = format!("a budget of at least {}", 2 * motions.bytes());
+        assert!(message.contains(&enough), "{message}");
     }
 }

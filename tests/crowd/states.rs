@@ -266,6 +266,8 @@ fn tables_come_back_from_words_and_broken_ones_are_refused() {
                 .flat_map(|clip| [(clip, 0), (clip, 12_345), (clip, u32::MAX)])
                 .collect();
             let _ = states(&engine, &tables, parts, &at);
+            let all: Vec<usize> = (0..tables.clip_count()).collect();
+            let _ = tables.select(parts, &all);
         }
     }
     let states = MotionStates::default();
@@ -274,6 +276,50 @@ fn tables_come_back_from_words_and_broken_ones_are_refused() {
     let states = MotionStates::default();
     let others = tables.sample_into(&engine, (&spans[1..], &cells), &[(0, 0)], states);
     assert_eq!(others, Err(CrowdError::BrokenTables));
+}
+
+#[test]
+fn some_clips_have_the_states_that_they_have_among_all() {
+    let mut random = Random(83);
+    let (joints, engine) = (7, Engine::new(Device::Cpu).unwrap());
+    let skeleton = skeleton(&mut random, joints);
+    let sets = sets(&mut random, joints);
+    for method in [method::SLERP, method::BESSEL_OVERHAUSER, method::STEP] {
+        for precision in [KeyPrecision::Exact, KeyPrecision::Packed] {
+            let mut builder = MotionBuilder::new(&skeleton, TICKS, precision).unwrap();
+            for set in &sets {
+                builder.push(set, method, VectorMethod::Linear).unwrap();
+            }
+            let (tables, spans, cells) = builder.finish();
+            let parts = (&spans[..], &cells[..]);
+            let at = instances(&mut random, &tables, 120);
+            let all = states(&engine, &tables, parts, &at);
+            let (some, some_spans, some_cells) = tables.select(parts, &[2, 0]).unwrap();
+            let some_parts = (&some_spans[..], &some_cells[..]);
+            assert!(some_cells.len() < cells.len() && some.clip_count() == 2);
+            // They are sound, as a file's are.
+            let some = MotionTables::new(some.words(), some_parts).unwrap();
+            for (instance, &(clip, tick)) in at.iter().enumerate() {
+                let clip = match clip {
+                    0 => 1,
+                    2 => 0,
+                    _ => continue,
+                };
+                let one = states(&engine, &some, some_parts, &[(clip, tick)]);
+                let these = instance * joints..(instance + 1) * joints;
+                assert_eq!(
+                    one.rotations,
+                    all.rotations[these.clone()],
+                    "{}",
+                    method.name
+                );
+                assert_eq!(one.positions, all.positions[these.clone()]);
+                assert_eq!(one.angular_velocities, all.angular_velocities[these]);
+            }
+            let missing = tables.select(parts, &[3]).unwrap_err();
+            assert!(matches!(missing, CrowdError::Missing { index: 3, .. }));
+        }
+    }
 }
 
 /// The angle between two rotations.

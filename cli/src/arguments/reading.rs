@@ -261,6 +261,7 @@ impl ReadingArguments {
             bridge_gaps: self.bridge_gaps,
             keyframes: self.reads_file_keys(),
             has_body_model: self.body_model.is_some(),
+            tracks: None,
         })
     }
 

@@ -213,8 +213,8 @@ fn replaced_offsets(before: &Motion, after: &Motion) -> Vec<usize> {
 
 /// Sets where each joint rests relative to its parent, for files that do not contain this: motion of SMPL bodies,
 /// whose joint positions depend on the shape of the body. `numbers` are x, y, z of each joint, in the order of the
-/// tracks. For an SMPL body, the first offset is the position of the pelvis when `trans` is 0; it is added to the
-/// translations of the first track.
+/// tracks. For an SMPL body, the offset of the root is the position of the pelvis when `trans` is 0; it is added to the
+/// translations of the root.
 ///
 /// # Errors
 /// When there are not three numbers for each joint of the clip, or a joint with a parent is moved by translation keys; the
@@ -239,16 +239,15 @@ pub fn set_offsets(clip: &mut Motion, numbers: &[f64]) -> Result<(), OffsetsErro
     }
     let lacks_offsets = clip.lacks_offsets();
     // SMPL's `trans` is relative to the pelvis of the body shape.
-    if let Some(body) = clip.body.clone()
-        && let Some(&pelvis) = offsets.first()
-    {
-        let pelvis = DVec3::from_array(pelvis);
-        if let Some(translations) = clip.set.vector_keys(Channel::Translation, 0) {
+    let root = (clip.skeleton.iter()).position(|joint| joint.parent.is_none());
+    if let (Some(body), Some(root)) = (clip.body.clone(), root) {
+        let pelvis = DVec3::from_array(offsets[root]);
+        if let Some(translations) = clip.set.vector_keys(Channel::Translation, root) {
             let before = body.pelvis.as_dvec3();
             let moved = |key: &Vec3| (key.as_dvec3() - before + pelvis).as_vec3();
             let keys: Vec<Vec3> = translations.keys.iter().map(moved).collect();
             let (times, tangents) = (translations.times.to_vec(), translations.tangents.to_vec());
-            clip.set.set_translations(0, &times, &keys, &tangents)?;
+            clip.set.set_translations(root, &times, &keys, &tangents)?;
         }
         clip.body = Some(Body {
             pelvis: pelvis.as_vec3(),
@@ -346,6 +345,32 @@ impl JointOffsets {
                 Err(lines.refuse_whole(Code::Offsets, message.to_owned()))
             }
             false => Ok(Self { names, numbers }),
+        }
+    }
+
+    /// The number of joints.
+    #[must_use]
+    pub fn joint_count(&self) -> usize {
+        self.numbers.len() / 3
+    }
+
+    /// The names of the joints; empty if they have none.
+    #[must_use]
+    pub fn names(&self) -> &[String] {
+        &self.names
+    }
+
+    /// Those of the joints that a clip has, if they have names; otherwise all.
+    #[must_use]
+    pub fn some_of(&self, clip: &Motion) -> Self {
+        let tracks = 0..clip.set.track_count();
+        let known: Vec<String> = tracks.map(|track| clip.set.track_name(track)).collect();
+        let (offsets, _) = self.numbers.as_chunks::<3>();
+        let all = self.names.iter().cloned().zip(offsets.iter().copied());
+        let kept: Vec<(String, [f64; 3])> = all.filter(|(name, _)| known.contains(name)).collect();
+        match kept.is_empty() {
+            true => self.clone(),
+            false => Self::named(kept),
         }
     }
 

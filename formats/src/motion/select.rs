@@ -1,8 +1,39 @@
 //! Makes a clip of some tracks of a clip.
 
+use std::fmt;
+
 use tumble::TrackError;
 
 use crate::motion::Motion;
+
+/// A track of a clip, by its name or its index.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum TrackName {
+    /// By its name.
+    Name(String),
+    /// By its index in the file, from 0.
+    Index(usize),
+}
+
+impl TrackName {
+    /// Whether it is that of this track.
+    #[must_use]
+    pub fn is_of(&self, index: usize, name: &str) -> bool {
+        match self {
+            Self::Name(known) => known == name,
+            &Self::Index(known) => known == index,
+        }
+    }
+}
+
+impl fmt::Display for TrackName {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Name(name) => write!(f, "`{name}`"),
+            Self::Index(index) => write!(f, "{index}"),
+        }
+    }
+}
 
 impl Motion {
     /// The clip of these tracks, in this order, and of all scalars. A joint whose parent is not among them becomes a root.

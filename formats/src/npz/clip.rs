@@ -12,7 +12,7 @@ use crate::motion::keys::{Duplicates, Origin, quiet_unit, select};
 use crate::motion::origin::relative;
 use crate::motion::signs::continue_signs;
 use crate::motion::{
-    Body, Joint, Motion, RecordedBodies, RecordedRobot, RecordedSample, Transform,
+    Body, Joint, Motion, RecordedBodies, RecordedRobot, RecordedSample, TrackName, Transform,
 };
 use crate::npz::archive::Archive;
 use crate::npz::array::{Array, AsStored, MIN_PARALLEL_KEYS, Make, Strides, TOGETHER};
@@ -79,12 +79,24 @@ pub(crate) fn read(
     };
     // While the keys of some tracks are added to the set, the keys of the next tracks are read.
     let at_once = TOGETHER * std::thread::available_parallelism().map_or(1, usize::from);
+    let read_of = read_tracks(plan, options);
+    let is_read = |track: usize| read_of.get(track).copied().unwrap_or(true);
     let jobs = plan.parts.iter().zip(&arrays).flat_map(|(part, array)| {
-        let starts = part.tracks.clone().step_by(at_once);
-        starts.map(move |start| (part, array, start..(start + at_once).min(part.tracks.end)))
+        let all: Vec<usize> = part.tracks.clone().collect();
+        let runs = all.chunk_by(|&a, &b| is_read(a) == is_read(b));
+        let runs = runs.flat_map(|run| run.chunks(at_once));
+        let jobs = runs.map(|run| (part, array, run[0]..run[0] + run.len()));
+        jobs.collect::<Vec<_>>()
     });
     let mut origins = Vec::new();
     let mut push = |track: usize, values: KeyKind, keys: TrackKeys| match keys {
+        TrackKeys::NotRead if !values.is_rotation() => Ok(()),
+        TrackKeys::NotRead => {
+            let name = plan.names.get(track).map_or("", String::as_str);
+            let times = &times[..times.len().min(1)];
+            let rest = &[Quat::IDENTITY][..times.len()];
+            set.push(name, times, rest).map_err(refuse)
+        }
         TrackKeys::Rotations(mut keys) => {
             select(&mut keys, kept.as_deref());
             let name = plan.names.get(track).map_or("", String::as_str);
@@ -107,7 +119,10 @@ pub(crate) fn read(
             let mut pending = pending.drain(..);
             pending.try_for_each(|(track, values, keys)| push(track, values, keys))
         };
-        let mut read = || read_keys(archive, part, array, tracks.clone(), plan.frames, warnings);
+        let mut read = || match is_read(tracks.start) {
+            true => read_keys(archive, part, array, tracks.clone(), plan.frames, warnings),
+            false => Ok(tracks.clone().map(|_| TrackKeys::NotRead).collect()),
+        };
         let (pushed, read) = match is_small {
             true => (push_pending(), read()),
             false => {
@@ -155,6 +170,22 @@ pub(crate) fn read(
         }
     }
     Ok(motion)
+}
+
+/// For each track, whether its keys are read: those of tracks that will not be selected are not.
+fn read_tracks(plan: &ArchivePlan, options: &ReadOptions) -> Vec<bool> {
+    let name = |track: usize| plan.names.get(track).map_or("", String::as_str);
+    let Some(selected) = &options.tracks else {
+        return vec![true; plan.tracks];
+    };
+    let is_selected = |track| selected.iter().any(|one| one.is_of(track, name(track)));
+    let found: Vec<bool> = (0..plan.tracks).map(is_selected).collect();
+    // A name that is not stored may be one that tracks without names get.
+    let is_stored = |one: &TrackName| (0..plan.tracks).any(|track| one.is_of(track, name(track)));
+    match selected.iter().all(is_stored) {
+        true => found,
+        false => vec![true; plan.tracks],
+    }
 }
 
 /// At how many keys the bodies of a robot are read, for the check of their order.
@@ -261,6 +292,8 @@ fn frame_of(part: &KeyArray, array: &Array<'_>, frame: usize) -> Vec<Vec<f64>> {
 
 /// The keys of one track.
 enum TrackKeys {
+    /// The track is at rest, because it will not be selected.
+    NotRead,
     /// Unit quaternions.
     Rotations(Vec<Quat>),
     /// Translations or scales, and the vector to add to translations.

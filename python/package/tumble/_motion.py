@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import glob as _glob
+import numbers
+import operator
 import os
+import pathlib
 import zipfile
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
@@ -26,6 +29,7 @@ from tumble._tumble import (
     load,
     load_all,
     represent,
+    scalar_motions,
     shaped,
 )
 
@@ -33,22 +37,28 @@ if TYPE_CHECKING:
     _Path: TypeAlias = str | os.PathLike[str]
     _Skeleton: TypeAlias = Clip | _Path | tuple[Sequence[int | None], ArrayLike]
     _OnError: TypeAlias = Literal["refuse", "skip"]
-    _Name: TypeAlias = Literal[
+    _JointName: TypeAlias = Literal[
         "rotations", "positions", "world_rotations", "velocities", "angular_velocities"
     ]
+    _ScalarName: TypeAlias = Literal["dofs", "dof_velocities", "contacts"]
+    _Name: TypeAlias = _JointName | _ScalarName
     from typing_extensions import TypeVar as _TypeVar
 
     # The arrays of results: of NumPy, or of a library on a device.
     _A = _TypeVar("_A", default=NDArray[np.float32])
 else:
     _A = TypeVar("_A")
-_NAMES: tuple[_Name, ...] = (
+# The arrays of joints.
+_NAMES: tuple[_JointName, ...] = (
     "rotations",
     "positions",
     "world_rotations",
     "velocities",
     "angular_velocities",
 )
+# The arrays of scalars.
+_SCALARS: tuple[_ScalarName, ...] = ("dofs", "dof_velocities", "contacts")
+_ALL: tuple[_Name, ...] = (*_NAMES, *_SCALARS)
 # The shape of a rotation in each representation.
 _SHAPES: dict[str, tuple[int, ...]] = {"quaternion": (4,), "matrix": (3, 3), "6d": (6,), "rotvec": (3,)}
 # Where the arrays of a file start: a multiple of every processor's alignment, and of a cache line.
@@ -73,6 +83,9 @@ class MotionState(_WithWeakReferences[_A]):
     world_rotations: (…, joints, 4).
     velocities: (…, joints, 3), in the world.
     angular_velocities: (…, joints, 3), about the world's axes.
+    dofs: (…, dofs), the scalars of the clips (`MotionLibrary.dof_names`), such as the angles of a robot's joints.
+    dof_velocities: (…, dofs), their derivatives.
+    contacts: (…, contacts), the scalars that are contacts (`MotionLibrary.contact_names`), 0 or 1.
 
     Arrays of a library on a device are `DeviceArray`s.
 
@@ -86,11 +99,14 @@ class MotionState(_WithWeakReferences[_A]):
     world_rotations: _A | None = None
     velocities: _A | None = None
     angular_velocities: _A | None = None
+    dofs: _A | None = None
+    dof_velocities: _A | None = None
+    contacts: _A | None = None
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, MotionState):
             return NotImplemented
-        pairs = [(getattr(self, name), getattr(other, name)) for name in _NAMES]
+        pairs = [(getattr(self, name), getattr(other, name)) for name in _ALL]
         return all(
             first is second
             or first is not None
@@ -109,7 +125,7 @@ if TYPE_CHECKING:
     _Progress: TypeAlias = Callable[[int, int], object] | Any
 
     class _Whole(MotionState[_A]):
-        """A state of which no array was left out."""
+        """A state of which no array of joints was left out."""
 
         rotations: _A
         positions: _A
@@ -125,6 +141,9 @@ if TYPE_CHECKING:
         world_rotations: Any
         velocities: Any
         angular_velocities: Any
+        dofs: Any
+        dof_velocities: Any
+        contacts: Any
 
     class _Rotations(_Some[_A]):
         rotations: _A
@@ -162,6 +181,38 @@ class Skipped:
     message: str
 
 
+@dataclass(slots=True)
+class _Scalars:
+    """Scalars as coordinates of bodies: their tables, names, and the coordinate that each is; or why there are none."""
+
+    motions: Motions | None
+    names: list[str]
+    columns: list[int]
+    reason: str | None = None
+
+    def arrays(self, kind: str, clips: Sequence[int] | None) -> dict[str, Any]:
+        """Everything, as arrays of a file."""
+        if self.motions is None:
+            return {}
+        arrays = self.motions.arrays(clips) | {
+            "names": np.array(self.names, dtype=np.str_),
+            "columns": np.array(self.columns, np.int64),
+        }
+        return {f"{kind}_{name}": array for name, array in arrays.items()}
+
+    @classmethod
+    def of_arrays(cls, kind: str, arrays: dict[str, Any]) -> _Scalars:
+        prefix = f"{kind}_"
+        own = {name.removeprefix(prefix): array for name, array in arrays.items() if name.startswith(prefix)}
+        if not own:
+            return cls(None, [], [])
+        motions = Motions.of_arrays(own)
+        names, columns = [str(name) for name in own["names"]], np.asarray(own["columns"], np.int64)
+        if columns.shape != (len(names),) or ((columns < 0) | (columns >= 3 * motions.joints)).any():
+            raise InputError(f"arrays: the columns of the {kind} are not those of {len(names)} scalars")
+        return cls(motions, names, columns.tolist())
+
+
 class MotionLibrary(Generic[_A]):
     """Clips of one skeleton, of any lengths and rates, which can be sampled at any times.
 
@@ -182,6 +233,11 @@ class MotionLibrary(Generic[_A]):
     A clip without offsets, such as an SMPL body without a model of its shape, has rotations only: its positions and
     velocities are refused.
 
+    Scalars that all clips have, such as the angles of a robot's joints, are sampled, too: `dof_names`, and `contact_names`
+    for those that are contacts, which are steps. The other scalars are interpolated by `method`, lines for slerp.
+
+    `paths`: the path of the file of each clip; empty for a clip that was not read from one.
+
     Times count from the first key of a clip, and are kept to at least 0.5 µs (30 ns for clips of up to two minutes);
     before 0 and after its end, a clip keeps its first and last pose.
 
@@ -198,9 +254,11 @@ class MotionLibrary(Generic[_A]):
     """
 
     names: list[str]
+    paths: list[str]
     lengths: NDArray[np.float64]
     rates: NDArray[np.float64]
     skipped: list[Skipped]
+    _skipped_indices: list[int]
 
     @overload
     def __init__(
@@ -257,10 +315,20 @@ class MotionLibrary(Generic[_A]):
         ]
         kept = [index for index in range(len(clips)) if index not in left_out]
         self.names = [all_names[index] for index in kept]
+        self.paths = [os.fspath(clips[index].path or "") for index in kept]
+        # By these shards divide clips: the index of each in the list, or that of its file among all files.
+        self._shard_indices = np.array(kept, np.int64)
+        self._skipped_indices = list(left_out)
         self.lengths = np.array([clips[index].duration for index in kept])
         self.rates = np.array([_rate(clips[index]) for index in kept])
         self._engine = engine if engine is not None else Engine()
         self._method = method
+        ticks = self._motions.ticks_per_second
+        used = [clips[index] for index in kept]
+        self._scalars = {
+            kind: _Scalars(*scalar_motions(used, method, ticks, contacts=kind == "contacts"))
+            for kind in ("dofs", "contacts")
+        }
         self._file: str | None = None
         self._only: NDArray[np.int64] | None = None
         self._put_on(device)
@@ -324,11 +392,14 @@ class MotionLibrary(Generic[_A]):
         of every file belongs to the library, in the order of the names.
 
         `fps`: clips are sampled at this rate by `method`; an incomplete frame at the end is left out. `tracks`: the names
-        or the indices of joints, in the order of the results; their parents must be included, too. `shard`: read only the
-        files for one of several processes, as (rank, processes).
+        or the indices of joints, in the order of the results; their parents must be included, too. The keys of other joints
+        in NPZ files and pickles are not read. `shard`: read only the files for one of several processes, as
+        (rank, processes): the library is then `load(…).shard(rank, processes)`. For the order of the joints, the first file of
+        all is read, too, unless `skeleton` has it.
 
         `options`: the keywords of `tumble.load`, for each file, such as `source_fps`, `up`, `scale`, `offsets`,
-        `body_model` and `map`. `on_error`: "refuse" ends at the first file that cannot be read; "skip" leaves out such
+        `body_model` and `map`. With `tracks`, `offsets` are those of the selected joints, in the order of `tracks`, or of
+        all joints of the file, in its order, as the number of rows says; or a dict by names. `on_error`: "refuse" ends at the first file that cannot be read; "skip" leaves out such
         files, and clips that do not fit the skeleton, and lists them in `skipped`. Files of AMASS without a motion
         (`shape.npz`, `*_stagei.npz`) are left out, too. `progress`: a bar such as `tqdm.tqdm` or an instance of it, or a
         function, which is called with the number of files read so far and of all. `packed`, `device`: as of the class.
@@ -347,27 +418,75 @@ class MotionLibrary(Generic[_A]):
             if not found:
                 raise FileNotFoundError(f"no file matches {pattern}")
             paths += found
-        if shard is not None:
-            paths = [paths[index] for index in _share(len(paths), *shard)]
-        with _bar(progress, len(paths)) as step:
-            read, faults = load_all(
-                paths, options, skip=_skips(on_error), progress=step, fps=fps, tracks=tracks, method=method
+        rank, processes = (0, 1) if shard is None else _rank(shard)
+        share = list(_share(len(paths), rank, processes))
+        skip = _skips(on_error)
+
+        def read(
+            indices: list[int], step: Callable[[int, int], object] | None = None
+        ) -> tuple[list[tuple[int, Clip]], list[tuple[int, Skipped]]]:
+            """The clips of files, and the files that were skipped, each with the index of the file."""
+            files, faults = load_all(
+                [paths[index] for index in indices],
+                options,
+                skip=skip,
+                progress=step,
+                fps=fps,
+                tracks=tracks,
+                method=method,
             )
-        skipped = [Skipped(os.fspath(path), None, code, message) for path, code, message in faults]
-        clips = [clip for file in read for clip in file.clips]
-        if not clips and skipped:
-            raise InputError(f"no file could be read; the first: {skipped[0].message}")
+            at_fault = [(os.fspath(path), code, message) for path, code, message in faults]
+            clips: list[tuple[int, Clip]] = []
+            left_out: list[tuple[int, Skipped]] = []
+            rest = iter(files)
+            for index in indices:
+                # Files were read in this order.
+                if at_fault and at_fault[0][0] == os.fspath(pathlib.Path(paths[index])):
+                    path, code, message = at_fault.pop(0)
+                    left_out.append((index, Skipped(path, None, code, message)))
+                else:
+                    clips += [(index, clip) for clip in next(rest).clips]
+            return clips, left_out
+
+        with _bar(progress, len(share)) as step:
+            clips, skipped = read(share, step)
+        if not clips:
+            if skipped:
+                raise InputError(f"no file could be read; the first: {skipped[0][1].message}")
+            if shard is not None:
+                raise InputError(f"shard: none of the {len(paths)} files is for process {rank} of {processes}")
+        # The joints have the order of the first clip of all files, whichever process it belongs to.
+        before: list[tuple[int, Clip]] = []
+        if skeleton is None:
+            for index in range(clips[0][0] if clips else 0):
+                if index % processes != rank and not before:
+                    before = read([index])[0]
         if skeleton is not None and not isinstance(skeleton, tuple):
             skeleton = shaped(_clip_of(skeleton), tracks=tracks)
+        every = before + clips
         made: MotionLibrary[Any] = cls(
-            clips, method=method, skeleton=skeleton, engine=engine, on_error=on_error, packed=packed, device=device
+            [clip for _, clip in every],
+            method=method,
+            skeleton=skeleton,
+            engine=engine,
+            on_error=on_error,
+            packed=packed,
+            device=device,
         )
-        made.skipped = skipped + made.skipped
-        return made
+        file_of = np.array([index for index, _ in every], np.int64)
+        made._shard_indices = file_of[made._shard_indices]
+        made.skipped = [one for _, one in skipped] + made.skipped
+        made._skipped_indices = [index for index, _ in skipped] + [int(file_of[index]) for index in made._skipped_indices]
+        return made if shard is None else made.shard(rank, processes)
 
     def _put_on(self, device: _Device | None) -> None:
         """Copies the clips to a device."""
         self._device: Engine | None = None
+        if isinstance(device, str) and device.lower() == "auto":
+            raise InputError(
+                'device: with "auto", results could be arrays of NumPy\'s or DeviceArrays; give "cpu", "vulkan", or a name '
+                "or an index in tumble.devices()"
+            )
         if device is None or (isinstance(device, str) and device.lower() == "cpu"):
             return
         self._device = device if isinstance(device, Engine) else Engine(device)
@@ -384,19 +503,34 @@ class MotionLibrary(Generic[_A]):
         return "CPU" if self._device is None else self._device.device
 
     def shard(self, rank: int, processes: int) -> MotionLibrary[_A]:
-        """The clips for one of several processes; each clip belongs to one process. The memory is shared, not copied.
+        """The clips for one of several processes; each clip belongs to one process. The clips of a library that was loaded are
+        divided by their files, as `load` with `shard` divides them. The memory is shared, not copied; `save` and pickles
+        contain the clips of the shard alone.
 
         >>> import tumble
         >>> doors = [tumble.Clip([0.0, 2.0], [[[0, 0, 0, 1], [0, 0, 1, 0]]], parents=[None], name=name) for name in "abc"]
         >>> tumble.MotionLibrary(doors).shard(0, 2).names
         ['a', 'c']
         """
-        share = _share(len(self), rank, processes)
+        rank, processes = _rank((rank, processes))
+        share = np.flatnonzero(self._shard_indices % processes == rank)
+        if not share.size:
+            raise InputError(f"shard: none of the {len(self)} clips is for process {rank} of {processes}")
+        part = self._part(share)
+        part._shard_indices = part._shard_indices // processes
+        skipped = [(index, one) for index, one in zip(self._skipped_indices, self.skipped) if index % processes == rank]
+        part.skipped = [one for _, one in skipped]
+        part._skipped_indices = [index // processes for index, _ in skipped]
+        return part
+
+    def _part(self, clips: NDArray[np.int64]) -> MotionLibrary[_A]:
+        """Some clips, by their indices, in the same memory."""
         part: MotionLibrary[_A] = MotionLibrary.__new__(MotionLibrary)
         part.__dict__.update(self.__dict__)
-        part.names = [self.names[index] for index in share]
-        part.lengths, part.rates = self.lengths[share], self.rates[share]
-        part._only = self._ids(np.array(share, np.int64))
+        part.names = [self.names[index] for index in clips]
+        part.paths = [self.paths[index] for index in clips]
+        part.lengths, part.rates, part._shard_indices = self.lengths[clips], self.rates[clips], self._shard_indices[clips]
+        part._only = self._ids(clips)
         return part
 
     def _ids(self, ids: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -553,10 +687,7 @@ class MotionLibrary(Generic[_A]):
         >>> library.sample(0, [0.5, 1.0], rotations="6d").rotations.shape
         (2, 1, 6)
         """
-        ids = _on_host(clip_ids)
-        if ids.dtype.kind not in "iu" and ids.size:
-            raise InputError(f"clip_ids: their type is {ids.dtype}; give whole numbers")
-        moments = _on_host(times).astype(np.float64, copy=False)
+        ids, moments = _indices("clip_ids", clip_ids), _numbers("times", times, "seconds")
         try:
             shape = np.broadcast_shapes(ids.shape, moments.shape)
         except ValueError:
@@ -564,10 +695,15 @@ class MotionLibrary(Generic[_A]):
             raise InputError(f"clip_ids and times: their shapes are {shapes}; give shapes that broadcast") from None
         ids = self._ids(np.ascontiguousarray(np.broadcast_to(ids, shape), np.int64).reshape(-1))
         moments = np.ascontiguousarray(np.broadcast_to(moments, shape)).reshape(-1)
-        each = _shapes_of(order, rotations)
+        each = {name: (self._motions.joints, *of) for name, of in _shapes_of(order, rotations).items()}
+        each |= {name: (len(self._scalars[_kind(name)].names),) for name in _SCALARS}
+        if isinstance(arrays, str):
+            raise TypeError(f'arrays: {arrays!r} is one name; give a list, such as ["{arrays}"]')
         for name in arrays if arrays is not None else ():
-            if name not in _NAMES:
-                raise InputError(f"arrays: there is no `{name}`; there are {', '.join(_NAMES)}")
+            if name not in _ALL:
+                raise InputError(f"arrays: there is no `{name}`; there are {', '.join(_ALL)}")
+            if name in _SCALARS:
+                self._check_scalars(name)
         if self._device is not None:
             if out is not None or order != "xyzw" or rotations != "quaternion":
                 raise InputError(
@@ -576,13 +712,18 @@ class MotionLibrary(Generic[_A]):
                 )
             return self._sampled_on_device(ids, moments, shape, _NAMES if arrays is None else tuple(arrays), finite)
         if out is None:
-            joints = self._motions.joints
-            asked = _NAMES if arrays is None else arrays
-            out = MotionState(**{name: _aligned((*shape, joints, *each[name])) for name in asked})
+            every = (*_NAMES, *(name for name in _SCALARS if self._scalars[_kind(name)].names))
+            asked = every if arrays is None else arrays
+            out = MotionState(**{name: _aligned((*shape, *each[name])) for name in asked})
+        elif not isinstance(out, MotionState):
+            raise TypeError(f"out: it is of the type {type(out).__name__}; give a MotionState, such as a result of `sample`")
         elif arrays is not None:
             raise InputError("arrays and out: the arrays of `out` are those that are filled; give one of the two")
         else:
-            _check_out(out, shape, self._motions.joints, each)
+            for name in _SCALARS:
+                if getattr(out, name) is not None:
+                    self._check_scalars(name)
+            _check_out(out, shape, each)
         filled = _flat(out, len(shape))
         if rotations == "quaternion":
             self._fill(ids, moments, finite, filled)
@@ -597,19 +738,50 @@ class MotionLibrary(Generic[_A]):
             self._fill(ids, moments, finite, found)
             for of, array in ((found.rotations, filled.rotations), (found.world_rotations, filled.world_rotations)):
                 if of is not None and array is not None:
-                    represent(of, rotations, array)
+                    represent(self._engine, of, rotations, array)
         if order == "wxyz":
             for array in (out.rotations, out.world_rotations):
                 if array is not None:
                     array[...] = np.roll(array, 1, axis=-1)
+        self._fill_scalars(ids, moments, finite, filled)
         return out
+
+    def _check_scalars(self, name: str) -> None:
+        """Refuses arrays of scalars that a library does not have."""
+        kind = _kind(name)
+        if self._device is not None:
+            raise InputError(f"arrays: {name} are sampled on the CPU; use a library without `device` for them")
+        if not self._scalars[kind].names:
+            reason = self._scalars[kind].reason
+            raise InputError(f"arrays: the library has no {name}" + (f": {reason}" if reason else ""))
+
+    def _fill_scalars(
+        self, ids: NDArray[np.int64], moments: NDArray[np.float64], finite: bool, out: MotionState
+    ) -> None:
+        """Fills the arrays of scalars, (N, scalars)."""
+        for kind, values, rates in (("dofs", out.dofs, out.dof_velocities), ("contacts", out.contacts, None)):
+            scalars = self._scalars[kind]
+            if scalars.motions is None or values is None and rates is None:
+                continue
+            at, speeds = (
+                None if array is None else np.empty((ids.size, scalars.motions.joints, 3), np.float32)
+                for array in (values, rates)
+            )
+            frames = self._frames(ids) if finite and speeds is not None else None
+            scalars.motions.sample(self._engine, ids, moments, None, at, None, speeds, None, frames)
+            for array, found in ((values, at), (rates, speeds)):
+                if array is not None and found is not None:
+                    np.take(found.reshape(ids.size, -1), scalars.columns, axis=1, out=array, mode="clip")
 
     def _frames(self, ids: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """The rates and lengths of the clips in memory, for differences between frames."""
         rates = self._each(self.rates)
-        known = np.isnan(rates[ids[(ids >= 0) & (ids < len(rates))]])
-        if known.any():
-            raise InputError("finite: a clip has no rate; load it with `fps`")
+        known = ids[(ids >= 0) & (ids < len(rates))]
+        unknown = known[np.isnan(rates[known])]
+        if unknown.size:
+            index = int(unknown[0]) if self._only is None else int(np.flatnonzero(self._only == unknown[0])[0])
+            name = self.paths[index] or self.names[index]
+            raise InputError(f"finite: clip {index} ({name}) has no rate; load it with `fps`")
         return rates, self._each(self.lengths)
 
     def _sampled_on_device(
@@ -787,10 +959,11 @@ class MotionLibrary(Generic[_A]):
         >>> library.sample_windows([0, 0, 0], [0.0, 0.5, 1.0], 10, fps=30).rotations.shape
         (3, 10, 1, 4)
         """
-        if count < 0 or not fps > 0:
-            raise InputError(f"count and fps: {count} and {fps}; give a number of states, and a rate greater than 0")
-        ids, first = _on_host(clip_ids)[..., None], _on_host(starts).astype(np.float64, copy=False)[..., None]
-        times = first + np.arange(count) / fps
+        count, rate = _count("count", count, "a number of states"), _number("fps", fps, "frames a second")
+        if not rate > 0:
+            raise InputError(f"fps: {fps} is no rate greater than 0")
+        ids, first = _indices("clip_ids", clip_ids)[..., None], _numbers("starts", starts, "seconds")[..., None]
+        times = first + np.arange(count) / rate
         keywords: dict[str, Any] = {"finite": finite, "order": order, "rotations": rotations}
         if arrays is not None:
             keywords["arrays"] = arrays
@@ -820,10 +993,12 @@ class MotionLibrary(Generic[_A]):
         >>> ids
         array([0, 0, 0, 0])
         """
-        if not 0 <= window < np.inf:
+        count, seconds = _count("count", count, "a number of clips"), _number("window", window, "seconds")
+        if seconds < 0:
             raise InputError(f"window: {window!r} is no number of seconds from 0 on")
-        left = self.lengths - window
-        each = np.asarray(np.maximum(left, 0.0) if weights is None else weights, np.float64)
+        _check_generator(rng)
+        left = self.lengths - seconds
+        each = np.maximum(left, 0.0) if weights is None else _numbers("weights", weights, "numbers")
         if each.shape != (len(self),) or not np.isfinite(each).all() or (each < 0).any():
             raise InputError(f"weights: give a number of 0 or more for each of the {len(self)} clips")
         fits = left >= 0
@@ -851,7 +1026,8 @@ class MotionLibrary(Generic[_A]):
         >>> [tumble.MotionLibrary([long], packed=packed).nbytes // (22 * 3000) for packed in (False, True)]
         [16, 8]
         """
-        return sum(array.nbytes for array in self._motions.arrays().values())
+        tables = [self._motions, *(scalars.motions for scalars in self._scalars.values() if scalars.motions is not None)]
+        return sum(array.nbytes for motions in tables for array in motions.arrays().values())
 
     def sample_times(self, clip_ids: ArrayLike, rng: np.random.Generator) -> NDArray[np.float64]:
         """A time within each of these clips, uniformly, in seconds after its first key.
@@ -862,7 +1038,8 @@ class MotionLibrary(Generic[_A]):
         >>> ((0 <= times) & (times <= 2)).all()
         np.True_
         """
-        ids = np.asarray(clip_ids)
+        _check_generator(rng)
+        ids = _indices("clip_ids", clip_ids)
         unknown = ids[(ids < 0) | (ids >= len(self))]
         if unknown.size:
             raise InputError(f"clip_ids: there is no clip {unknown[0]}; there are {len(self)}, from 0")
@@ -930,13 +1107,22 @@ class MotionLibrary(Generic[_A]):
             raise InputError(f"{file or 'arrays'}: not a motion library of this version of tumble")
         self: MotionLibrary[Any] = cls.__new__(cls)
         self.names = [str(name) for name in arrays["names"]]
+        clips = len(self.names)
+        self.paths = [str(path) for path in arrays["paths"]] if "paths" in arrays else [""] * clips
+        self._shard_indices = np.asarray(arrays["shard_indices"] if "shard_indices" in arrays else np.arange(clips), np.int64)
+        if len(self.paths) != clips or self._shard_indices.shape != (clips,):
+            raise InputError(f"{file or 'arrays'}: its paths or shard indices are not those of {clips} clips")
         self.lengths = np.asarray(arrays["lengths"])
         self.rates = np.asarray(arrays["rates"])
         self._method = str(arrays["method"])
         self._motions = Motions.of_arrays(arrays)
+        self._scalars = {kind: _Scalars.of_arrays(kind, arrays) for kind in ("dofs", "contacts")}
+        if any(one.motions is not None and len(one.motions) != len(self._motions) for one in self._scalars.values()):
+            raise InputError(f"{file or 'arrays'}: its scalars are not those of {len(self._motions)} clips")
         self._engine = engine if engine is not None else Engine()
         self._file = file
         self.skipped = []
+        self._skipped_indices = []
         self._only = np.asarray(arrays["only"]) if "only" in arrays else None
         self._put_on(device)
         return self
@@ -946,18 +1132,23 @@ class MotionLibrary(Generic[_A]):
             "version": np.array(_VERSION),
             "method": np.array(self._method),
             "names": np.array(self.names, dtype=np.str_),
+            "paths": np.array(self.paths, dtype=np.str_),
+            "shard_indices": self._shard_indices,
             "lengths": self.lengths,
             "rates": self.rates,
             "joint_names": np.array(self.joint_names, dtype=np.str_),
-            "unplaced": np.array(self._motions.unplaced, dtype=np.str_),
         }
-        if self._only is not None:
-            about["only"] = self._only
-        return {**about, **self._motions.arrays()}
+        unplaced, only = self._motions.unplaced, None if self._only is None else self._only.tolist()
+        if only is not None and unplaced:
+            unplaced = [unplaced[index] for index in only]
+        about["unplaced"] = np.array(unplaced, dtype=np.str_)
+        for kind, scalars in self._scalars.items():
+            about |= scalars.arrays(kind, only)
+        return {**about, **self._motions.arrays(only)}
 
     def __reduce__(self) -> tuple[Any, ...]:
         if self._file is not None:
-            return _opened, (self._file, self._engine, self._only, self._device)
+            return _opened, (self._file, self._engine, self._only, self._device, self._shard_indices)
         return MotionLibrary._of_arrays, (self._arrays(), self._engine, None, self._device)
 
     def __len__(self) -> int:
@@ -972,6 +1163,23 @@ class MotionLibrary(Generic[_A]):
     def joint_names(self) -> list[str]:
         """The names of the joints, in the order of all arrays: those of the skeleton."""
         return self._motions.joint_names
+
+    @property
+    def dof_names(self) -> list[str]:
+        """The names of the scalars in `dofs` and `dof_velocities`, in their order.
+
+        >>> import tumble
+        >>> arm = tumble.Clip([0.0, 1.0], [[0, 0, 0, 1]] * 2, parents=[None], scalars={"elbow": ([0.0, 1.0], [0.0, 2.0])})
+        >>> library = tumble.MotionLibrary([arm])
+        >>> library.dof_names, library.sample(0, 0.25, arrays=["dofs"]).dofs
+        (['elbow'], array([0.5], dtype=float32))
+        """
+        return list(self._scalars["dofs"].names)
+
+    @property
+    def contact_names(self) -> list[str]:
+        """The names of the scalars in `contacts`, in their order."""
+        return list(self._scalars["contacts"].names)
 
     @property
     def method(self) -> str:
@@ -1021,13 +1229,16 @@ def _shapes_of(order: str, rotations: str) -> dict[str, tuple[int, ...]]:
     return {name: _SHAPES[rotations] if name.endswith("rotations") else (3,) for name in _NAMES}
 
 
-def _check_out(
-    out: MotionState, shape: tuple[int, ...], joints: int, each: dict[str, tuple[int, ...]]
-) -> None:
+def _kind(name: str) -> str:
+    """The scalars of an array."""
+    return "contacts" if name == "contacts" else "dofs"
+
+
+def _check_out(out: MotionState, shape: tuple[int, ...], each: dict[str, tuple[int, ...]]) -> None:
     """Refuses arrays of another shape, type or order in memory than results have."""
-    for name in _NAMES:
+    for name in _ALL:
         array = getattr(out, name)
-        expected = (*shape, joints, *each[name])
+        expected = (*shape, *each[name])
         if array is None:
             continue
         if not isinstance(array, np.ndarray):
@@ -1042,7 +1253,7 @@ def _check_out(
 
 def _flat(state: MotionState, axes: int) -> MotionState:
     """The same memory with one axis of instances."""
-    arrays = {name: getattr(state, name) for name in _NAMES}
+    arrays = {name: getattr(state, name) for name in _ALL}
     instances = {name: array for name, array in arrays.items() if array is not None}
     return MotionState(
         **{name: array.reshape(int(np.prod(array.shape[:axes])), *array.shape[axes:]) for name, array in instances.items()}
@@ -1050,21 +1261,93 @@ def _flat(state: MotionState, axes: int) -> MotionState:
 
 
 def _opened(
-    file: str, engine: Engine, only: NDArray[np.int64] | None = None, device: Engine | None = None
+    file: str,
+    engine: Engine,
+    only: NDArray[np.int64] | None = None,
+    device: Engine | None = None,
+    shard_indices: NDArray[np.int64] | None = None,
 ) -> MotionLibrary[Any]:
     library: MotionLibrary[Any] = MotionLibrary.open(file, engine=engine, device=device)
-    if only is None or library._only is not None:
-        return library
-    library.names = [library.names[index] for index in only]
-    library.lengths, library.rates, library._only = library.lengths[only], library.rates[only], only
+    if only is not None and library._only is None:
+        library = library._part(only)
+    if shard_indices is not None:
+        library._shard_indices = shard_indices
     return library
+
+
+def _rank(shard: object) -> tuple[int, int]:
+    """The rank of a process, and the number of processes."""
+    if not isinstance(shard, tuple | list) or len(shard) != 2:
+        raise TypeError(f"shard: {shard!r}; give (rank, processes)")
+    rank, processes = (_count("shard", number, "(rank, processes)") for number in shard)
+    if not rank < processes:
+        raise InputError(f"shard: {rank} of {processes}; give a rank from 0 and below the number of processes")
+    return rank, processes
 
 
 def _share(count: int, rank: int, processes: int) -> range:
     """The indices that are the share of a process."""
-    if not 0 <= rank < processes:
-        raise InputError(f"shard: {rank} of {processes}; give a rank from 0 and below the number of processes")
     return range(rank, count, processes)
+
+
+def _is_number(value: object) -> bool:
+    """Whether it is a real number: no truth value, and no duration of NumPy's."""
+    return isinstance(value, numbers.Real) and not isinstance(value, bool | np.bool_ | np.timedelta64)
+
+
+def _count(label: str, value: object, meaning: str) -> int:
+    """A whole number from 0 on."""
+    if not _is_number(value) or not hasattr(value, "__index__"):
+        raise TypeError(f"{label}: {value!r}; give {meaning}, as a whole number from 0 on")
+    number = operator.index(value)
+    if number < 0:
+        raise InputError(f"{label}: {number}; give {meaning}, as a whole number from 0 on")
+    return number
+
+
+def _number(label: str, value: object, unit: str) -> float:
+    """A finite number."""
+    if not _is_number(value):
+        raise TypeError(f"{label}: {value!r}; give {unit}, as a number")
+    number = float(value)  # type: ignore[arg-type]
+    if not np.isfinite(number):
+        raise InputError(f"{label}: {number} is not finite")
+    return number
+
+
+def _numbers(label: str, values: object, unit: str) -> NDArray[np.float64]:
+    """Numbers of any shape. What converts to numbers, but means something else, is refused: truth values, durations and
+    dates, texts."""
+    array = _on_host(values)
+    if array.dtype.kind == "O" and all(_is_number(value) for value in array.flat):
+        array = array.astype(np.float64)
+    if array.dtype.kind not in "fiu":
+        hint = ", such as durations / np.timedelta64(1, 's')" if array.dtype.kind == "m" else ""
+        raise TypeError(f"{label}: their type is {array.dtype}{_first(array)}; give {unit}, as numbers{hint}")
+    return array.astype(np.float64, copy=False)
+
+
+def _first(array: NDArray[Any]) -> str:
+    return f", such as {array.flat[0]!r}" if array.size else ""
+
+
+def _indices(label: str, values: object) -> NDArray[np.int64]:
+    """Whole numbers of any shape."""
+    array = _on_host(values)
+    if not array.size and array.dtype.kind == "f":
+        array = array.astype(np.int64)
+    if array.dtype.kind == "b":
+        raise InputError(f"{label}: a mask of truth values; give whole numbers, such as np.flatnonzero(mask)")
+    if array.dtype.kind not in "iu":
+        raise InputError(f"{label}: their type is {array.dtype}{_first(array)}; give whole numbers")
+    if array.dtype.kind == "u" and array.size and array.max() > np.iinfo(np.int64).max:
+        raise InputError(f"{label}: there is no clip {array.max()}")
+    return array.astype(np.int64, copy=False)
+
+
+def _check_generator(rng: object) -> None:
+    if not isinstance(rng, np.random.Generator):
+        raise TypeError(f"rng: it is of the type {type(rng).__name__}; give a generator, such as np.random.default_rng(1)")
 
 
 @contextmanager
@@ -1145,7 +1428,7 @@ def _mapped(path: str) -> dict[str, Any]:
     with zipfile.ZipFile(path) as archive, open(path, "rb") as file:
         for info in archive.infolist():
             name = info.filename.removesuffix(".npy")
-            if name not in ("spans", "cells") or info.compress_type != zipfile.ZIP_STORED:
+            if not name.endswith(("spans", "cells")) or info.compress_type != zipfile.ZIP_STORED:
                 with archive.open(info) as member:
                     found[name] = np.lib.format.read_array(member, allow_pickle=False)
                 continue

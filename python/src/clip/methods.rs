@@ -9,15 +9,20 @@ use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 use tumble::{Channel, Device, Engine, Layout};
+use tumble_formats::join::{JoinError, join};
+use tumble_formats::motion::Motion;
+use tumble_formats::retime::retime;
 use tumble_formats::root_motion::{
     RootMotionOptions, RootMotionRule, keys_with_root_motion, root_joint, track_samples,
 };
+use tumble_formats::trim::trim;
 
-use crate::arrays::{ListArgument, Order};
+use crate::arrays::{ListArgument, Order, number};
 use crate::build::{ClipArguments, ClipKeys, KeysLayout, put_scalars, scalar_keys};
 use crate::clip::{Clip, counted};
+use crate::clip_shape::shaped;
 use crate::engine::{default_engine, layout_named};
-use crate::errors::{guarded, input};
+use crate::errors::{guarded, in_python, input, of_engine};
 use crate::features::heading_source;
 use crate::names::option_named;
 use crate::options::frame_rate;
@@ -382,6 +387,110 @@ impl Clip {
             device_array,
             options,
         )
+    }
+
+    /// The clip with some of its joints, `tracks`, by their names or indices, in this order. Their parents must be
+    /// included, too.
+    ///
+    /// >>> import tumble
+    /// >>> keys = [[[0, 0, 0, 1]], [[1, 0, 0, 0]]]
+    /// >>> clip = tumble.Clip([0.0], keys, layout="track", names=["hip", "knee"], parents=[None, 0])
+    /// >>> clip.select(["hip"]).names
+    /// ['hip']
+    fn select(slf: &Bound<'_, Self>, tracks: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let found = shaped(slf, None, Some(tracks), "slerp")?;
+        Ok(found.without_document())
+    }
+
+    /// The part of the clip from `start` to `end`, seconds; without one of the two, from its first key or to its last. Keys
+    /// keep their times and bits. A channel without a key at a cut gets one there, of its curve. Steps, lines and arcs
+    /// stay the same; smooth curves change in the intervals next to the cuts.
+    ///
+    /// >>> import tumble
+    /// >>> clip = tumble.Clip([0.0, 1.0, 2.0], [[0, 0, 0, 1], [1, 0, 0, 0], [0, 1, 0, 0]])
+    /// >>> clip.cut(1.0, 2.0).times(0)
+    /// array([1., 2.])
+    #[pyo3(signature = (start=None, end=None))]
+    fn cut(
+        &self,
+        py: Python<'_>,
+        start: Option<&Bound<'_, PyAny>>,
+        end: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Self> {
+        let start = start.map(|it| number(it, "start", "seconds")).transpose()?;
+        let end = end.map(|it| number(it, "end", "seconds")).transpose()?;
+        let motion = self.motion.clone();
+        let (start, end) = motion.range_in_set(start, end, self.span());
+        let part = work(py, motion.key_count(), move || {
+            let engine = Engine::new(Device::Cpu).map_err(|error| of_engine(&error))?;
+            let part = trim(&motion, start, end, &engine);
+            part.map_err(|error| input(in_python(&error.to_string())))
+        })?;
+        Ok(self.with_keys(part))
+    }
+
+    /// The clip `speed` times as fast, with its first key at `start`, seconds; without it, where it is. Keys keep their
+    /// bits; velocities and tangents are multiplied by the speed.
+    ///
+    /// >>> import tumble
+    /// >>> clip = tumble.Clip([0.0, 1.0], [[0, 0, 0, 1], [1, 0, 0, 0]])
+    /// >>> clip.retime(speed=2.0, start=10.0).times(0)
+    /// array([10. , 10.5])
+    #[pyo3(signature = (*, speed=None, start=None))]
+    fn retime(
+        &self,
+        py: Python<'_>,
+        speed: Option<&Bound<'_, PyAny>>,
+        start: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Self> {
+        let speed = speed
+            .map(|it| number(it, "speed", "a factor"))
+            .transpose()?;
+        let start = start.map(|it| number(it, "start", "seconds")).transpose()?;
+        let motion = self.motion.clone();
+        let retimed = work(py, motion.key_count(), move || {
+            let retimed = retime(&motion, speed.unwrap_or(1.0), start);
+            retimed.map_err(|error| input(error.to_string()))
+        })?;
+        Ok(self.with_keys(retimed))
+    }
+
+    /// Several clips, one after another. Joints are matched by name, and have the order and the name of the first clip.
+    /// `gap`: the seconds from the last key of a clip to the first key of the next; by default one frame, if the clips have
+    /// a common rate. With `gap=0.0`, one clip ends in the pose in which the next begins, which is kept once. All keys
+    /// keep their bits, and those of the first clip their times. Clips that differ in their joints, offsets, scalars or
+    /// interpolation are refused.
+    ///
+    /// >>> import tumble
+    /// >>> clip = tumble.Clip([0.0, 1.0, 2.0], [[0, 0, 0, 1], [1, 0, 0, 0], [0, 1, 0, 0]])
+    /// >>> tumble.Clip.concat([clip.cut(0.0, 1.0), clip.cut(1.0, 2.0)], gap=0.0) == clip
+    /// True
+    /// >>> tumble.Clip.concat([clip, clip]).times(0)
+    /// array([0., 1., 2., 3., 4., 5.])
+    #[staticmethod]
+    #[pyo3(signature = (clips, *, gap=None))]
+    fn concat(
+        py: Python<'_>,
+        clips: ListArgument<Self>,
+        gap: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Self> {
+        let gap = gap.map(|it| number(it, "gap", "seconds")).transpose()?;
+        let motions: Vec<Arc<Motion>> = clips.0.into_iter().map(|clip| clip.motion).collect();
+        let keys = motions.iter().map(|motion| motion.key_count()).sum();
+        let joined = work(py, keys, move || {
+            let motions: Vec<&Motion> = motions.iter().map(|motion| &**motion).collect();
+            join(&motions, gap).map_err(|error| {
+                let name = match error {
+                    JoinError::NoGap | JoinError::Gap { .. } | JoinError::Apart { .. } => "gap",
+                    _ => "clips",
+                };
+                input(format!("{name}: {error}"))
+            })
+        })?;
+        Ok(Self {
+            motion: Arc::new(joined),
+            source: None,
+        })
     }
 
     /// The clip without its motion over the ground (`rule` "in-place"), or with a joint, `root_motion`, that has it and

@@ -11,7 +11,7 @@ use tumble::{
 };
 use tumble_cli::host;
 
-use crate::arrays::{ListArgument, Order};
+use crate::arrays::{ListArgument, Order, whole_number};
 use crate::clip::Clip;
 use crate::engine::{
     Engine, EngineArguments, MIN_DEVICE_ROTATIONS, axes_named, layout_named, of_host,
@@ -38,15 +38,25 @@ impl Engine {
     pub(crate) fn new(
         py: Python<'_>,
         device: Option<&Bound<'_, PyAny>>,
-        memory: Option<u64>,
-        threads: Option<usize>,
+        memory: Option<&Bound<'_, PyAny>>,
+        threads: Option<&Bound<'_, PyAny>>,
         allow_inexact: bool,
         cache: Option<PathBuf>,
     ) -> PyResult<Self> {
         let name = match device {
-            Some(name) => name.str()?.to_str()?.to_owned(),
             None => "auto".to_owned(),
+            Some(name) if name.is_instance_of::<PyString>() => name.extract()?,
+            Some(index) => {
+                let meaning = "the name of a device, or its index";
+                whole_number::<u64>(index, "device", meaning)?.to_string()
+            }
         };
+        let memory = memory
+            .map(|it| whole_number(it, "memory", "bytes"))
+            .transpose()?;
+        let threads = threads
+            .map(|it| whole_number(it, "threads", "a number of threads"))
+            .transpose()?;
         let is_auto = name.eq_ignore_ascii_case("auto");
         let arguments = EngineArguments {
             device: name.clone(),

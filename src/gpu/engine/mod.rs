@@ -83,8 +83,10 @@ pub(crate) struct VulkanEngine {
     pub(crate) window: AtomicUsize,
     /// Bytes that the segments of one buffer may take.
     pub(crate) group_bytes: usize,
-    /// Bytes that the segments of one clip may take on the device; `None` without a memory budget.
+    /// Bytes that the segments of one clip may take on the device, half of the budget; `None` without a memory budget.
     pub(crate) clip_bytes: Option<usize>,
+    /// The memory budget, bytes.
+    pub(crate) budget: Option<u64>,
     /// Whether kernels that differ from the CPU are used nevertheless.
     allow_inexact: bool,
     free: FreeBuffers,
@@ -129,6 +131,7 @@ impl VulkanEngine {
             window: AtomicUsize::new(window),
             group_bytes: bytes(half.map_or(largest, |half| half.min(largest))),
             clip_bytes: half.map(bytes),
+            budget: options.memory,
             allow_inexact: options.allow_inexact,
             free: Arc::default(),
             host: CpuEngine::on_shared_threads(VectorWidth::widest()),
