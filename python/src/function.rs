@@ -29,7 +29,7 @@ use crate::run::work;
 /// array([[1.    , 0.    , 0.    , 0.    ],
 ///        [0.7071, 0.    , 0.    , 0.7071]], dtype=float32)
 #[pyfunction]
-#[pyo3(signature = (times, keys, *, out=None, order="xyzw", layout="track", as_rotation=false, dtype=None, device_array=false, **options), text_signature = "(times, keys, *, fps=None, at=None, start=None, end=None, method=None, path=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None, out=None, order='xyzw', layout='track', as_rotation=False, dtype='float32', device_array=False)")]
+#[pyo3(signature = (times, keys, *, out=None, order="xyzw", layout="track", as_rotation=false, dtype=None, device_array=false, **options), text_signature = "(times, keys, *, fps=None, at=None, start=None, end=None, method=None, signs=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None, out=None, order='xyzw', layout='track', as_rotation=False, dtype='float32', device_array=False)")]
 #[allow(clippy::too_many_arguments, reason = "keywords")]
 pub(crate) fn evaluate<'py>(
     times: &Bound<'py, PyAny>,

@@ -327,7 +327,7 @@ const NAMES: [&str; 6] = ["fps", "at", "times", "start", "end", "method"];
 fn check_name(name: &str) -> PyResult<()> {
     let options = InterpolationOption::ALL.map(|option| option.name);
     let known = [&NAMES[..], &options].concat();
-    if known.contains(&name) {
+    if known.contains(&name) || InterpolationOption::named(name).is_some() {
         return Ok(());
     }
     let refusal = format!("there is no keyword `{name}`");

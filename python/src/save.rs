@@ -70,7 +70,7 @@ const CHUNK: usize = 1 << 20;
 #[pyo3(signature = (
     path, clips, /, *, format=None, sequence=None, linear=None, order=None, layout="track",
     end_frame=None, times_out=None, quantize=false, meshopt=false, overwrite=true, engine=None, **options
-), text_signature = "(file, clips, /, *, fps=None, at=None, times=None, start=None, end=None, method=None, path=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None, format=None, sequence=None, linear=(), order=None, layout='track', end_frame=None, times_out=None, quantize=False, meshopt=False, overwrite=True, engine=None)")]
+), text_signature = "(file, clips, /, *, fps=None, at=None, times=None, start=None, end=None, method=None, signs=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None, format=None, sequence=None, linear=(), order=None, layout='track', end_frame=None, times_out=None, quantize=False, meshopt=False, overwrite=True, engine=None)")]
 #[allow(clippy::too_many_arguments, reason = "keywords")]
 pub(crate) fn save(
     py: Python<'_>,

@@ -209,7 +209,7 @@ MISSPELT = {
     "order": ("wxzy", "wxyz"),
     "after": ("mirrored", "mirror"),
     "speed": ("konstant", "constant"),
-    "path": ("shortst", "shortest"),
+    "signs": ("shortst", "shortest"),
 }
 
 

@@ -68,7 +68,7 @@ def test_rotation_vectors_are_those_of_scipy(clip, engine):
     assert [one.shape for one in lists] == [(1, 3), (2, 3), (0, 3)]
     assert np.array_equal(lists[1], engine.rotation_vectors(clip, at=[0.2, 0.3])[1])
     still = tumble.Clip([0.0], [[[0, 0, 0, 1]], [[0, 0, 0, -1]], [[1, 0, 0, 0]], [[0, 0.6, 0, -0.8]]])
-    vectors = engine.rotation_vectors(still, at=0.0, path="as-authored")
+    vectors = engine.rotation_vectors(still, at=0.0, signs="as-authored")
     expected = [[0, 0, 0], [0, 0, 0], [np.pi, 0, 0], [0, -2 * np.arctan2(0.6, 0.8), 0]]
     assert np.allclose(vectors, expected, atol=1e-7)
     with pytest.raises(tumble.InputError, match=r"out: its shape is \(3, 61, 4\); the result's is \(3, 61, 3\)"):

@@ -264,6 +264,8 @@ mod tests {
             "-1",
             "0.25",
         ];
+        let before = InterpolationOption::named("path").unwrap();
+        assert_eq!(before.name, "signs");
         let mut options = InterpolationOptions::default();
         for (option, value) in InterpolationOption::ALL.into_iter().zip(values) {
             assert_eq!(

@@ -363,7 +363,7 @@ impl Clip {
     /// >>> clip.evaluate(at=[0.0, 2.0], method="slerp")[0]
     /// array([[0., 0., 0., 1.],
     ///        [1., 0., 0., 0.]], dtype=float32)
-    #[pyo3(signature = (*, out=None, order="xyzw", layout="track", as_rotation=false, dtype=None, device_array=false, **options), text_signature = "($self, *, fps=None, at=None, times=None, start=None, end=None, method=None, path=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None, out=None, order='xyzw', layout='track', as_rotation=False, dtype='float32', device_array=False)")]
+    #[pyo3(signature = (*, out=None, order="xyzw", layout="track", as_rotation=false, dtype=None, device_array=false, **options), text_signature = "($self, *, fps=None, at=None, times=None, start=None, end=None, method=None, signs=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None, out=None, order='xyzw', layout='track', as_rotation=False, dtype='float32', device_array=False)")]
     #[allow(clippy::too_many_arguments, reason = "keywords")]
     fn evaluate<'py>(
         slf: &Bound<'py, Self>,
@@ -554,7 +554,7 @@ impl Clip {
     /// >>> clip = tumble.Clip([0.0, 2.0], [[0, 0, 0, 1], [1, 0, 0, 0]])
     /// >>> clip.sampler(method="slerp").pose(2.0)
     /// array([[1., 0., 0., 0.]], dtype=float32)
-    #[pyo3(signature = (**options), text_signature = "($self, *, method=None, path=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None)")]
+    #[pyo3(signature = (**options), text_signature = "($self, *, method=None, signs=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None)")]
     fn sampler(slf: &Bound<'_, Self>, options: Option<&Bound<'_, PyDict>>) -> PyResult<Sampler> {
         Sampler::of(slf, options)
     }
@@ -567,7 +567,7 @@ impl Clip {
     /// >>> import tumble
     /// >>> clip = tumble.Clip([0.0, 2.0], [[0, 0, 0, 1], [1, 0, 0, 0]])
     /// >>> axes = clip.plot(method="slerp")  # doctest: +SKIP
-    #[pyo3(signature = (track=None, *, fps=None, axes=None, **options), text_signature = "($self, track=None, *, fps=None, method=None, path=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None, axes=None)")]
+    #[pyo3(signature = (track=None, *, fps=None, axes=None, **options), text_signature = "($self, track=None, *, fps=None, method=None, signs=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None, axes=None)")]
     fn plot<'py>(
         slf: &Bound<'py, Self>,
         track: Option<&Bound<'py, PyAny>>,

@@ -153,7 +153,7 @@ impl Engine {
     /// take without a copy. Raises `DeviceError` if this is not possible.
     ///
     /// Other options: `method` ("authored": the method that the file gives each channel, bessel-overhauser
-    /// where it gives none; see `tumble.methods()`), `path` ("shortest", "as-authored"), `ends`
+    /// where it gives none; see `tumble.methods()`), `signs` ("shortest", "as-authored"), `ends`
     /// ("parabolic", "natural", "clamped", "secant", "loop", "frozen", or angular velocities (2, 3),
     /// rad/s), `speed` ("as-keyed", "constant"), `before` and `after` ("hold", "loop", "mirror",
     /// "extrapolate", "leave-out": no samples there), `tension`, `continuity`, `bias`.
@@ -163,7 +163,7 @@ impl Engine {
     /// >>> out = np.empty((1, 25, 4), np.float32)
     /// >>> tumble.Engine().evaluate(clip, fps=24, method="slerp", out=out) is out
     /// True
-    #[pyo3(signature = (clip, *, out=None, order="xyzw", layout="track", as_rotation=false, dtype=None, device_array=false, **options), text_signature = "($self, clip, *, fps=None, at=None, times=None, start=None, end=None, method=None, path=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None, out=None, order='xyzw', layout='track', as_rotation=False, dtype='float32', device_array=False)")]
+    #[pyo3(signature = (clip, *, out=None, order="xyzw", layout="track", as_rotation=false, dtype=None, device_array=false, **options), text_signature = "($self, clip, *, fps=None, at=None, times=None, start=None, end=None, method=None, signs=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None, out=None, order='xyzw', layout='track', as_rotation=False, dtype='float32', device_array=False)")]
     #[allow(clippy::too_many_arguments, reason = "keywords")]
     pub(crate) fn evaluate<'py>(
         &self,
@@ -212,7 +212,7 @@ impl Engine {
     /// >>> found = tumble.Engine("cpu").bodies(robot, [[3.0], [3.5]], order="wxyz", source_fps=2, fps=4)
     /// >>> found["joint_pos"].ravel()
     /// array([3.  , 3.25, 3.5 ], dtype=float32)
-    #[pyo3(signature = (robot, joint_pos, root_pos=None, root_quat=None, *, order, source_fps=None, source_times=None, joint_names=None, body_order="depth-first", siblings="file", velocity_at="origin", **options), text_signature = "($self, robot, joint_pos, root_pos=None, root_quat=None, *, order, source_fps=None, source_times=None, joint_names=None, body_order='depth-first', siblings='file', velocity_at='origin', fps=None, at=None, times=None, start=None, end=None, method=None, path=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None)")]
+    #[pyo3(signature = (robot, joint_pos, root_pos=None, root_quat=None, *, order, source_fps=None, source_times=None, joint_names=None, body_order="depth-first", siblings="file", velocity_at="origin", **options), text_signature = "($self, robot, joint_pos, root_pos=None, root_quat=None, *, order, source_fps=None, source_times=None, joint_names=None, body_order='depth-first', siblings='file', velocity_at='origin', fps=None, at=None, times=None, start=None, end=None, method=None, signs=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None)")]
     #[allow(clippy::too_many_arguments, reason = "keywords")]
     fn bodies<'py>(
         &self,
@@ -255,7 +255,7 @@ impl Engine {
     /// >>> clip = tumble.Clip([0.0], [[0, 0, 0, 1]], scalars={"knee": ([0.0, 1.0], [0.5, 0.25])})
     /// >>> tumble.Engine().scalars(clip, fps=2, method="slerp")
     /// array([[0.5  , 0.375, 0.25 ]], dtype=float32)
-    #[pyo3(signature = (clip, *, quantity="value", names=None, layout="track", **options), text_signature = "($self, clip, *, fps=None, at=None, times=None, start=None, end=None, method=None, path=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None, quantity='value', names=None, layout='track')")]
+    #[pyo3(signature = (clip, *, quantity="value", names=None, layout="track", **options), text_signature = "($self, clip, *, fps=None, at=None, times=None, start=None, end=None, method=None, signs=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None, quantity='value', names=None, layout='track')")]
     fn scalars<'py>(
         &self,
         clip: &Bound<'py, Clip>,
@@ -283,7 +283,7 @@ impl Engine {
     /// >>> clip = tumble.Clip([0.0, 2.0], [[0, 0, 0, 1], [0, 0, 1, 0]])
     /// >>> tumble.Engine().velocity(clip, at=[1.0], method="slerp").round(4)
     /// array([[[0.    , 0.    , 1.5708]]], dtype=float32)
-    #[pyo3(signature = (clip, *, axes="body", out=None, layout="track", device_array=false, **options), text_signature = "($self, clip, *, fps=None, at=None, times=None, start=None, end=None, method=None, path=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None, axes='body', out=None, layout='track', device_array=False)")]
+    #[pyo3(signature = (clip, *, axes="body", out=None, layout="track", device_array=false, **options), text_signature = "($self, clip, *, fps=None, at=None, times=None, start=None, end=None, method=None, signs=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None, axes='body', out=None, layout='track', device_array=False)")]
     fn velocity<'py>(
         &self,
         clip: &Bound<'py, Clip>,
@@ -306,7 +306,7 @@ impl Engine {
     /// >>> clip = tumble.Clip([0.0, 2.0], [[0, 0, 0, 1], [0, 0, 1, 0]])
     /// >>> tumble.Engine().acceleration(clip, at=[1.0], method="slerp").shape
     /// (1, 1, 3)
-    #[pyo3(signature = (clip, *, axes="body", out=None, layout="track", device_array=false, **options), text_signature = "($self, clip, *, fps=None, at=None, times=None, start=None, end=None, method=None, path=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None, axes='body', out=None, layout='track', device_array=False)")]
+    #[pyo3(signature = (clip, *, axes="body", out=None, layout="track", device_array=false, **options), text_signature = "($self, clip, *, fps=None, at=None, times=None, start=None, end=None, method=None, signs=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None, axes='body', out=None, layout='track', device_array=False)")]
     fn acceleration<'py>(
         &self,
         clip: &Bound<'py, Clip>,
@@ -332,7 +332,7 @@ impl Engine {
     /// array([[-1.,  0.,  0.],
     ///        [ 0., -1.,  0.],
     ///        [ 0.,  0.,  1.]], dtype=float32)
-    #[pyo3(signature = (clip, *, columns=3, out=None, layout="track", device_array=false, **options), text_signature = "($self, clip, *, fps=None, at=None, times=None, start=None, end=None, method=None, path=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None, columns=3, out=None, layout='track', device_array=False)")]
+    #[pyo3(signature = (clip, *, columns=3, out=None, layout="track", device_array=false, **options), text_signature = "($self, clip, *, fps=None, at=None, times=None, start=None, end=None, method=None, signs=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None, columns=3, out=None, layout='track', device_array=False)")]
     fn matrices<'py>(
         &self,
         clip: &Bound<'py, Clip>,
@@ -362,7 +362,7 @@ impl Engine {
     /// >>> clip = tumble.Clip([0.0, 2.0], [[0, 0, 0, 1], [0, 0, 1, 0]])
     /// >>> tumble.Engine().axis_angle(clip, at=1.0, method="slerp").round(3)
     /// array([[ 0.,  0.,  1., 90.]], dtype=float32)
-    #[pyo3(signature = (clip, *, degrees=true, out=None, layout="track", **options), text_signature = "($self, clip, *, fps=None, at=None, times=None, start=None, end=None, method=None, path=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None, degrees=True, out=None, layout='track')")]
+    #[pyo3(signature = (clip, *, degrees=true, out=None, layout="track", **options), text_signature = "($self, clip, *, fps=None, at=None, times=None, start=None, end=None, method=None, signs=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None, degrees=True, out=None, layout='track')")]
     fn axis_angle<'py>(
         &self,
         clip: &Bound<'py, Clip>,
@@ -388,7 +388,7 @@ impl Engine {
     /// >>> clip = tumble.Clip([0.0, 2.0], [[0, 0, 0, 1], [0, 0, 1, 0]])
     /// >>> tumble.Engine().euler(clip, at=1.0, sequence="ZXY", method="slerp").round(3)
     /// array([[90.,  0.,  0.]], dtype=float32)
-    #[pyo3(signature = (clip, *, sequence="XYZ", degrees=true, out=None, layout="track", **options), text_signature = "($self, clip, *, fps=None, at=None, times=None, start=None, end=None, method=None, path=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None, sequence='XYZ', degrees=True, out=None, layout='track')")]
+    #[pyo3(signature = (clip, *, sequence="XYZ", degrees=true, out=None, layout="track", **options), text_signature = "($self, clip, *, fps=None, at=None, times=None, start=None, end=None, method=None, signs=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None, sequence='XYZ', degrees=True, out=None, layout='track')")]
     fn euler<'py>(
         &self,
         clip: &Bound<'py, Clip>,
@@ -414,7 +414,7 @@ impl Engine {
     /// >>> clip = tumble.Clip([0.0, 2.0], [[0, 0, 0, 1], [0, 0, 1, 0]])
     /// >>> tumble.Engine().rotation_vectors(clip, at=1.0, method="slerp").round(4)
     /// array([[0.    , 0.    , 1.5708]], dtype=float32)
-    #[pyo3(signature = (clip, *, out=None, layout="track", **options), text_signature = "($self, clip, *, fps=None, at=None, times=None, start=None, end=None, method=None, path=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None, out=None, layout='track')")]
+    #[pyo3(signature = (clip, *, out=None, layout="track", **options), text_signature = "($self, clip, *, fps=None, at=None, times=None, start=None, end=None, method=None, signs=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None, out=None, layout='track')")]
     fn rotation_vectors<'py>(
         &self,
         clip: &Bound<'py, Clip>,
@@ -442,7 +442,7 @@ impl Engine {
     /// (1, 61, 4, 3)
     /// >>> tumble.Engine().encoded(clip, "axis-angle", at=1.0, method="slerp").round(3)
     /// array([[ 0.,  0.,  1., 90.]], dtype=float32)
-    #[pyo3(signature = (clip, encoding, *, major="row", sequence="XYZ", degrees=true, out=None, layout="track", device_array=false, **options), text_signature = "($self, clip, encoding, *, fps=None, at=None, times=None, start=None, end=None, method=None, path=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None, major='row', sequence='XYZ', degrees=True, out=None, layout='track', device_array=False)")]
+    #[pyo3(signature = (clip, encoding, *, major="row", sequence="XYZ", degrees=true, out=None, layout="track", device_array=false, **options), text_signature = "($self, clip, encoding, *, fps=None, at=None, times=None, start=None, end=None, method=None, signs=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None, major='row', sequence='XYZ', degrees=True, out=None, layout='track', device_array=False)")]
     #[allow(clippy::too_many_arguments, reason = "keywords")]
     fn encoded<'py>(
         &self,
@@ -481,7 +481,7 @@ impl Engine {
     /// array([[0., 0., 0.],
     ///        [2., 0., 0.],
     ///        [4., 0., 0.]], dtype=float32)
-    #[pyo3(signature = (clip, *, layout="track", **options), text_signature = "($self, clip, *, fps=None, at=None, times=None, start=None, end=None, method=None, path=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None, layout='track')")]
+    #[pyo3(signature = (clip, *, layout="track", **options), text_signature = "($self, clip, *, fps=None, at=None, times=None, start=None, end=None, method=None, signs=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None, layout='track')")]
     fn poses<'py>(
         &self,
         clip: &Bound<'py, Clip>,
@@ -502,7 +502,7 @@ impl Engine {
     /// >>> positions, rotations = tumble.Engine().world(clip, at=[0.0])
     /// >>> positions[1, 0].round(3)
     /// array([0., 1., 0.], dtype=float32)
-    #[pyo3(signature = (clip, *, layout="track", **options), text_signature = "($self, clip, *, fps=None, at=None, times=None, start=None, end=None, method=None, path=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None, layout='track')")]
+    #[pyo3(signature = (clip, *, layout="track", **options), text_signature = "($self, clip, *, fps=None, at=None, times=None, start=None, end=None, method=None, signs=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None, layout='track')")]
     fn world<'py>(
         &self,
         clip: &Bound<'py, Clip>,
@@ -767,7 +767,7 @@ impl Engine {
     /// slice(0, 1, None) slice(0, 4, None) (1, 4, 4)
     /// slice(0, 1, None) slice(4, 8, None) (1, 4, 4)
     /// slice(0, 1, None) slice(8, 10, None) (1, 2, 4)
-    #[pyo3(signature = (clip, *, chunk=1_048_576, order="xyzw", layout="track", **options), text_signature = "($self, clip, *, fps=None, at=None, times=None, start=None, end=None, method=None, path=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None, chunk=1048576, order='xyzw', layout='track')")]
+    #[pyo3(signature = (clip, *, chunk=1_048_576, order="xyzw", layout="track", **options), text_signature = "($self, clip, *, fps=None, at=None, times=None, start=None, end=None, method=None, signs=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None, chunk=1048576, order='xyzw', layout='track')")]
     fn stream(
         &self,
         clip: &Bound<'_, Clip>,
@@ -793,7 +793,7 @@ impl Engine {
     /// >>> rows = pyarrow.table({"times": [[0.0, 1.0]], "keys": [[0, 0, 0, 1, 1, 0, 0, 0]]})
     /// >>> tumble.Engine("cpu").batch(rows, fps=2, method="slerp")["frames"].to_pylist()
     /// [3]
-    #[pyo3(signature = (rows, *, order="xyzw", **options), text_signature = "($self, rows, *, fps=None, at=None, times=None, start=None, end=None, method=None, path=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None, order='xyzw')")]
+    #[pyo3(signature = (rows, *, order="xyzw", **options), text_signature = "($self, rows, *, fps=None, at=None, times=None, start=None, end=None, method=None, signs=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None, order='xyzw')")]
     fn batch<'py>(
         slf: &Bound<'py, Self>,
         rows: &Bound<'py, PyAny>,
@@ -837,7 +837,7 @@ impl Engine {
     /// >>> found = tumble.Engine("cpu").verify(clip, fps=25, method="slerp")
     /// >>> found.differing, found.max_error < 6e-7
     /// (0, True)
-    #[pyo3(signature = (clip, **options), text_signature = "($self, clip, *, fps=None, at=None, times=None, start=None, end=None, method=None, path=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None)")]
+    #[pyo3(signature = (clip, **options), text_signature = "($self, clip, *, fps=None, at=None, times=None, start=None, end=None, method=None, signs=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None)")]
     fn verify(
         &self,
         clip: &Bound<'_, Clip>,
