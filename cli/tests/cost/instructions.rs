@@ -270,7 +270,7 @@ fn evaluates_a_kept_clip() {
         } else {
             let request = clip.request(&frame_times).samples(0..frames);
             request
-                .evaluate_into(bytemuck::cast_slice_mut(&mut output))
+                .evaluate_into(bytemuck::cast_slice_mut::<_, u8>(&mut output))
                 .unwrap();
         }
     }
