@@ -87,8 +87,9 @@ impl Clip {
     /// The memory that the clip takes on the host for each key, in bytes; 0 for a clip without keys.
     ///
     /// By default a clip keeps a segment for each key: 64 bytes for an arc, and 144, 176 or 208 for a polynomial. The
-    /// smaller the rotation between two keys, the fewer coefficients the CPU keeps; nearly all segments of recorded
-    /// motion take 144 bytes. Devices keep all coefficients. On the CPU a clip keeps its keys instead (16 bytes each;
+    /// smaller the rotation between two keys, the fewer coefficients of Catmull-Rom, Bessel-Overhauser, Hermite and
+    /// B-spline curves the CPU keeps; nearly all of their segments of recorded motion take 144 bytes. Other methods mostly
+    /// need all coefficients, and devices keep all. On the CPU a clip keeps its keys instead (16 bytes each;
     /// tracks with the same times share them) if its segments would take more memory than
     /// [`EngineOptions::kept_segments`](crate::EngineOptions::kept_segments) or than the engine may use, and if samples
     /// can be computed from the keys: for arcs, and for cubics that mostly rotate little between keys. Both limits are
