@@ -3,7 +3,7 @@
 //! error of each rounding is known, and a sum can be computed again, bit for bit. Therefore all rates are tested. A list
 //! of usual rates only decides if times with few digits agree with several.
 //!
-//! The table in `docs/formats.md` is the test of this module.
+//! The table in `docs/testing.md` is the test of this module.
 
 use tumble::FrameRate;
 

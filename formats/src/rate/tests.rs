@@ -1,8 +1,8 @@
-//! Reads the table of `docs/formats.md`, and finds the rate of each of its rows.
+//! Reads the table of `docs/testing.md`, and finds the rate of each of its rows.
 
 use super::*;
 
-const PAGE: &str = include_str!("../../../docs/formats.md");
+const PAGE: &str = include_str!("../../../docs/testing.md");
 
 /// The rows of the table: a number as written, the number that is kept, and its rate.
 fn rows() -> Vec<[&'static str; 3]> {
