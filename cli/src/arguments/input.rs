@@ -450,6 +450,8 @@ struct Expansion {
     found: Vec<FoundInput>,
     /// The inputs that `--exclude` leaves out. Directories count theirs only if none is left.
     excluded: usize,
+    /// The path is a pattern that no file matches.
+    is_unmatched: bool,
 }
 
 /// One input file, and its path below a directory of results.
@@ -536,6 +538,7 @@ impl GatheredInputs {
         let mut seen: HashMap<PathBuf, usize> = HashMap::new();
         let mut repeated: Vec<(usize, FoundInput)> = Vec::new();
         let mut excluded = 0;
+        let mut unmatched: Vec<String> = Vec::new();
         let exclusions = Exclusions::new(selection.exclude);
         let named = paths.iter().map(|path| NamedPath {
             path,
@@ -548,6 +551,9 @@ impl GatheredInputs {
         for NamedPath { path, is_listed } in named.chain(listed) {
             let expansion = gathered.expand(path, selection, &exclusions);
             excluded += expansion.excluded;
+            if expansion.is_unmatched {
+                unmatched.push(names::input(path));
+            }
             for mut found in expansion.found {
                 // The results of a list have the same directory tree as the list.
                 if is_listed && let Some(below) = plain(&found.path) {
@@ -566,6 +572,11 @@ impl GatheredInputs {
                     }
                 }
             }
+        }
+        // Said here, because a command checks its output before it opens its inputs.
+        if !unmatched.is_empty() && unmatched.len() >= gathered.files.len() {
+            let message = format!("{}: no file matches this pattern", unmatched.join(", "));
+            return Err(Failure::new(exit::ALL_INPUTS, message));
         }
         gathered.settle(repeated);
         gathered.unread.note();
@@ -602,7 +613,9 @@ impl GatheredInputs {
             if index < LISTED {
                 let [name, kept] = [&found.path, &kept.path].map(|path| names::input(path));
                 words::warning(&match name == kept {
-                    true => format!("{name}: named twice; it is processed once"),
+                    true => format!(
+                        "{name}: named twice (by itself, a directory or a pattern); it is processed once"
+                    ),
                     false => {
                         format!("{name}: is the same file as {kept}, and is processed once")
                     }
@@ -634,7 +647,7 @@ impl GatheredInputs {
         if names::is_standard(path) {
             return Expansion {
                 found: alone(),
-                excluded: 0,
+                ..Expansion::default()
             };
         }
         if path.is_dir() {
@@ -647,17 +660,23 @@ impl GatheredInputs {
                 // The error is reported when the file is opened.
                 return Expansion {
                     found: alone(),
-                    excluded,
+                    ..Expansion::default()
                 };
             }
             self.many = true;
-            return Expansion { found, excluded };
+            return Expansion {
+                found,
+                excluded,
+                is_unmatched: false,
+            };
         }
         let matching = match path.is_file() {
             true => Vec::new(),
             false => matches(path),
         };
         self.many |= !matching.is_empty();
+        let is_unmatched =
+            matching.is_empty() && !path.exists() && path.to_str().is_some_and(is_pattern);
         // A file that does not exist is reported when it is opened.
         let all = match matching.is_empty() {
             true => alone(),
@@ -670,6 +689,7 @@ impl GatheredInputs {
         let found: Vec<FoundInput> = left.collect();
         Expansion {
             excluded: count - found.len(),
+            is_unmatched: is_unmatched && !found.is_empty(),
             found,
         }
     }

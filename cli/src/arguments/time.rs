@@ -346,7 +346,7 @@ impl SamplingArguments {
             && let Some(meant) = broadcast_rate(rate)
         {
             words::warning(&format!(
-                "{} frames per second is taken as written; the broadcast rate is {meant}",
+                "exactly {} frames per second is used; for the broadcast (NTSC) rate write {meant}",
                 rate.per_second()
             ));
         }
@@ -568,8 +568,8 @@ fn warn_outside_keys(start: f64, end: f64, clip: &Motion, outside: Outside, name
         let [start, end, first, last] =
             [start, end, first, last].map(|time| time + clip.time_offset as f64);
         words::warning(&format!(
-            "{name}: asked for {start} to {end} s, keys lie from {first} to {last} s; \
-             --before and --after select the values outside them (by default the first and the last key)"
+            "{name}: the times from {start} to {end} s exceed the keys, {first} to {last} s; outside them the first or \
+             the last key is held (--before and --after select other values)"
         ));
     }
 }

@@ -232,9 +232,12 @@ impl ManifestEntry {
 
     /// As [`ManifestEntry::is_made_from`], of any input.
     pub(crate) fn is_made_with(&self, options: &str) -> bool {
-        self.options == options
-            && self.kernels_sha256 == kernels_sha256()
-            && self.tumble == env!("CARGO_PKG_VERSION")
+        self.options == options && self.is_of_this_program()
+    }
+
+    /// Whether a program of this version with the same kernels made it.
+    pub(crate) fn is_of_this_program(&self) -> bool {
+        self.kernels_sha256 == kernels_sha256() && self.tumble == env!("CARGO_PKG_VERSION")
     }
 }
 

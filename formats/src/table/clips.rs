@@ -379,8 +379,11 @@ impl TableClip<'_> {
             }
             warnings.warn_of(missing.len(), Code::Bridged, || {
                 let message = format!(
-                    "the track `{name}` lacks {} of its keys; it is interpolated from the others",
-                    missing.len()
+                    "{} of the track `{name}` without a value left out; the curve joins the others",
+                    match missing.len() {
+                        1 => "1 key".to_owned(),
+                        count => format!("{count} keys"),
+                    }
                 );
                 let row = self.row(missing[0] as usize);
                 (
