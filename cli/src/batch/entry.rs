@@ -356,7 +356,7 @@ impl ManifestLines {
         UnfinishedInputs { failed, pending }
     }
 
-    /// The results of inputs that failed, at least in part, or that no batch has come to.
+    /// The results of inputs that failed, at least in part, or that no batch has processed yet.
     pub(crate) fn unfinished(&self) -> BTreeSet<String> {
         self.inputs.keys().cloned().collect()
     }
@@ -465,7 +465,7 @@ pub(crate) trait ResultRecorder {
 pub(crate) struct PreviousEntries {
     pub(super) folder: PathBuf,
     pub(super) entries: Arc<BTreeMap<String, ManifestEntry>>,
-    /// The results of inputs that failed, at least in part, or that no batch has come to.
+    /// The results of inputs that failed, at least in part, or that no batch has processed yet.
     pub(super) unfinished: Arc<BTreeSet<String>>,
 }
 

@@ -492,8 +492,8 @@ impl TableClip<'_> {
     }
 }
 
-/// The positions of the rows with scalars, by increasing time, and the list with their times: those of the first track, or
-/// all of a table without tracks.
+/// The indices of the rows with scalars, sorted by time, and the index of the list of their times. These are the rows of
+/// the first track, or all rows of a table without tracks.
 fn scalar_rows(shared: &SharedRows<'_>) -> (Vec<u32>, usize) {
     match shared.tracks.first() {
         Some(track) => (shared.positions(track).to_vec(), track.list),
