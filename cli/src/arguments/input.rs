@@ -36,8 +36,8 @@ pub(crate) struct Inputs {
     /// With --files-from: the inputs in the list end in NUL characters, as `find -print0` writes them, instead of line ends
     #[arg(short = '0', long, requires = "files_from")]
     null: bool,
-    /// Leave out files and folders whose names match a pattern, such as '*_draft.bvh', or 'takes/old' for names
-    /// that follow each other in a path; may be given several times
+    /// Leave out files and folders whose names match a pattern, such as '*_draft.bvh', or a part of a path such
+    /// as 'takes/old'; may be given several times
     #[arg(long, value_name = "PATTERN", value_parser = PathPattern::new)]
     exclude: Vec<PathPattern>,
     /// Read named pipes too
@@ -46,7 +46,7 @@ pub(crate) struct Inputs {
     /// The largest input to read
     #[arg(long, value_name = "SIZE", default_value = "16GiB", value_parser = words::parse_bytes)]
     max_size: u64,
-    /// The memory limit for reading an input, besides the input itself [default: 64 times its length
+    /// The memory limit for reading an input, not counting the input itself [default: 64 times its length
     /// plus 64MiB]
     #[arg(long, value_name = "SIZE", value_parser = words::parse_bytes)]
     max_memory: Option<u64>,

@@ -34,7 +34,7 @@ const BROADCAST_TOLERANCE: f64 = 2e-4;
 
 #[derive(Debug, Clone, Args)]
 pub(crate) struct SamplingArguments {
-    /// Frames per second: from the first key to the last, a number, a ratio, such as 30000/1001, or `source`, the rate
+    /// Frames per second, from the first key to the last: a number, a ratio such as 30000/1001, or `source`, the rate
     /// of the input's keys (25 if they have no rate, or a rate below 10)
     #[arg(
         short = 'f',
@@ -150,10 +150,10 @@ pub(crate) struct KeyTimes {
 /// `--max-gap`: between which keys a clip is not interpolated.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct GapArguments {
-    /// The longest gap, seconds: keys that are further apart are not interpolated
+    /// Do not interpolate between keys that are more than SECONDS apart
     #[arg(long, value_name = "SECONDS", value_parser = not_negative)]
     max_gap: Option<f64>,
-    /// What to do with times in such gaps
+    /// What to do with times between keys that are more than --max-gap apart
     #[arg(long, value_enum, requires = "max_gap", default_value = "leave-out")]
     in_gaps: InGaps,
 }

@@ -22,8 +22,8 @@ use crate::messages::words;
 /// Test that a device gives the same bits as the CPU, for every kernel and for recorded and random inputs, and measure its speed
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Every kernel is compared with the same function on the CPU. Recorded results of every method, output \
-and crowd are computed in every configuration in which the engine may use the device. Random tracks \
+Every kernel is compared with the same function on the CPU. The recorded results of every method, output \
+and crowd are computed again in every configuration in which the engine may use the device. Random tracks \
 and crowds are compared with the CPU until the time limit. The same is done on a Vulkan device that is \
 created in the way in which a renderer creates it. Every bit is compared. Times are measured by the device's clock. \
 `docs/proofs.md` lists devices that were tested, and explains the JSON.
