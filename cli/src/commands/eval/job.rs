@@ -385,7 +385,9 @@ impl EvaluationJob<'_> {
             count => format!(" ({count} in gaps {})", self.arguments.gaps.done_in_gaps()),
         };
         let left_out = match self.left_out {
-            Some(seconds) => format!(" (the {seconds:.3} s after the last one are left out)"),
+            Some(seconds) => {
+                format!(" ({seconds:.3} s of the clip, after the last frame, are left out)")
+            }
             None => String::new(),
         };
         let assumed = work.clips();
