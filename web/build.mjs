@@ -1,5 +1,5 @@
-// Joins page, style, scripts and libraries into the page that the program carries.
-// `npm ci && npm run build` after any change in src/.
+// Bundles page, style, scripts and libraries into the one HTML file that is compiled into the program.
+// Run `npm ci && npm run build` after any change in src/.
 
 import { createHash } from "node:crypto";
 import { readFileSync, readdirSync, writeFileSync } from "node:fs";
@@ -7,7 +7,7 @@ import { build } from "esbuild";
 
 const read = (path) => readFileSync(path, "utf8");
 
-// A test compares this with what it finds: a page older than its sources is noticed.
+// The page contains the hash of its sources. A test compares it, so that a page older than its sources is noticed.
 const sources = [...readdirSync("src").sort().map((name) => `src/${name}`), "build.mjs", "package-lock.json", "../npm/package/core.js"];
 const hash = createHash("sha1");
 for (const path of sources) hash.update(read(path));

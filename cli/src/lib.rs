@@ -46,11 +46,11 @@ Examples:
 
 Exit codes:
   0 success                        5 Vulkan is required, and there is no Vulkan device
-  1 a bug in tumble                6 the device failed, or its bits differ
+  1 a bug in Tumble                6 the device failed, or its bits differ
   2 the command line is wrong      7 output could not be written
   3 some inputs failed             8 results differ or are missing, or nothing was proved
   4 all inputs failed              129 to 131, 141, 143 ended by a signal
-A result that is too large is 4 for the memory and 7 for the disk; of several inputs the others go on.";
+A result that is too large for the memory ends with 4, for the disk with 7; of several inputs, the others continue.";
 
 /// The command line.
 #[derive(Debug, Parser)]

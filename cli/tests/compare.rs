@@ -290,8 +290,8 @@ fn joints_are_matched_by_name_and_parent() {
         ),
         (
             "compare one.bvh a.dat",
-            "one.bvh has a joint `hip`, but the joints of a.dat have no names; name both, or neither to match them by \
-             index",
+            "one.bvh has a joint `hip`, but the joints of a.dat have no names; joints are matched by name, or by \
+             index if neither clip has names",
         ),
     ] {
         let run = run(folder, &line.split(' ').collect::<Vec<_>>());

@@ -123,11 +123,12 @@ fn an_end_that_is_moved_or_left_out_is_told() {
         )
     };
     let words = eval("out.bvh");
-    let expected = "out.bvh: warning[W210]: the clip ends at 1.125 s, between two frames at 30 fps; one more frame, \
-                    at 1.133333 s, has the value of the end";
+    let expected = "out.bvh: warning[W210]: the clip ends at 1.125 s, between two frames at 30 fps; a last frame, \
+                    at 1.133333 s, repeats the end";
     assert!(words.contains(expected), "{words}");
     let words = eval("out.npy");
-    let expected = "1 track × 34 frames (the 0.025 s after the last one are left out), ";
+    let expected =
+        "1 track × 34 frames (0.025 s of the clip, after the last frame, are left out), ";
     assert!(words.contains(expected), "{words}");
     for asked in [
         "out.bvh --end-frame hold",

@@ -364,7 +364,7 @@ fn a_dry_run_names_what_failed_before() {
     }
     let made = run(folder, &words("eval in -o out --device cpu"));
     assert_eq!(made.code, 3, "{}", made.words);
-    says(&made, "1 of 2 inputs failed; the others did not");
+    says(&made, "1 of 2 inputs failed");
     let dry = line(folder, "eval in -o out --resume --dry-run --device cpu");
     let text = String::from_utf8(dry.out.clone()).unwrap() + &dry.words;
     assert!(
@@ -406,6 +406,50 @@ fn pickles_are_called_pkl() {
         "eval in/take.csv --robot robot.xml --dialect gmr -f 30 --velocity-at mass -o mass.pkl",
         "--velocity-at has no effect on gmr",
     );
+}
+
+/// The message is about the input, not about an output that would also be refused; and no empty report looks like a
+/// success.
+#[test]
+fn inputs_that_do_not_exist_are_the_fault_that_is_reported() {
+    let temporary = sample_folder();
+    let folder = temporary.path();
+    let unmatched = run(folder, &words("eval nothing/*.bvh -o out"));
+    assert_eq!(unmatched.code, 4, "{}", unmatched.words);
+    says(&unmatched, "nothing/*.bvh: no file matches this pattern");
+    assert!(!unmatched.words.contains("end the output"));
+    let missing = run(folder, &words("verify none.dat --device cpu"));
+    assert_eq!((missing.code, &*missing.out), (4, &b""[..]));
+    says(&missing, "none.dat: error[E001]");
+    // The unknown track is the only message.
+    fs::copy(root().join("data/walk.bvh"), folder.join("walk.bvh")).unwrap();
+    let unknown = run(folder, &words("eval walk.bvh --tracks nothing -o x.npy"));
+    says(&unknown, "there is no `nothing`");
+    assert!(!unknown.words.contains("W208"), "{}", unknown.words);
+}
+
+/// Frames of several clips are not the frames of one.
+#[test]
+fn the_clips_of_a_result_are_counted() {
+    let temporary = tempfile::tempdir().unwrap();
+    let folder = temporary.path();
+    fs::write(folder.join("m.gltf"), crate::attack::two_animations()).unwrap();
+    let made = line(folder, "eval m.gltf --fps 10 -o out.glb");
+    says(&made, "2 clips of 1 track, 22 frames in all");
+}
+
+/// Ranges are shown in words, not in Rust's syntax.
+#[test]
+fn numbers_out_of_range_are_refused_with_the_range() {
+    let temporary = tempfile::tempdir().unwrap();
+    for boxes in ["0", "65537", "many"] {
+        let refused = run(
+            temporary.path(),
+            &["generate", "--boxes", boxes, "-o", "o.dat"],
+        );
+        assert_eq!(refused.code, 2, "{}", refused.words);
+        says(&refused, "give a whole number from 1 to 65536");
+    }
 }
 
 /// A joint of the input that nothing follows is named, and how far it rotates.

@@ -257,7 +257,7 @@ fn what_cannot_be_rendered_is_refused_and_nothing_is_written() {
         (
             "render a.dat -o x.mp4",
             2,
-            "x.mp4: end the film in .gif or .apng, a picture in .png, or give a directory",
+            "x.mp4: unknown ending; give .gif or .apng for a film, .png for a picture, or a directory",
         ),
         ("render a.dat b.dat -o x.gif", 2, "takes a single input"),
         (

@@ -121,7 +121,7 @@ fn a_dry_run_names_the_results_that_the_batch_then_makes_skips_and_removes() {
         text(&dry).lines().collect::<Vec<_>>(),
         [
             "in/a.dat → out/a.npy (complete, would be skipped)",
-            "in/c.dat → out/c.npy (made again: its input, an option or the program differs, or it is damaged)",
+            "in/c.dat → out/c.npy (made again: its input changed)",
             "in/d.dat → out/d.npy",
             "in/m.gltf → out/m.Run.npy (complete, would be skipped)",
             "in/m.gltf → out/m.Walk.npy (complete, would be skipped)",
@@ -149,6 +149,20 @@ fn a_dry_run_names_the_results_that_the_batch_then_makes_skips_and_removes() {
     let summary = "2 results made, 3 results of 2 inputs skipped (already complete)";
     assert!(done.words.contains(summary), "{}", done.words);
     assert!(!folder.join("out/b.npy").exists() && folder.join("out/d.npy").exists());
+    // The reason is the one that applies.
+    let reason = |line: &str| {
+        let dry = run_of(line);
+        text(&dry).lines().next().unwrap().to_owned()
+    };
+    assert_eq!(
+        reason("eval in -o out -n --resume --fps 30"),
+        "in/a.dat → out/a.npy (made again: option --fps changed)"
+    );
+    fs::write(folder.join("out/a.npy"), "damaged").unwrap();
+    assert_eq!(
+        reason("eval in -o out -n --resume"),
+        "in/a.dat → out/a.npy (made again: its file was changed or damaged)"
+    );
     let one = run(folder, &words("eval in/m.gltf -o m.npy -n"));
     assert!(
         one.code == 4 && one.words.contains("--animation"),

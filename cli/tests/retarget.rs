@@ -327,7 +327,8 @@ fn the_file_of_a_character_keeps_its_mesh() {
         "retarget take.bvh --onto character.gltf -o walking.gltf",
     );
     assert!(
-        run.words.contains("22 of 22 joints follow, hips × 0.0100"),
+        run.words
+            .contains("22 of 22 joints are mapped, translations of the hips × 0.0100"),
         "{}",
         run.words
     );

@@ -118,7 +118,11 @@ fn a_way_over_a_hill() {
             "way.png",
         ],
     );
-    assert!(printed.words.contains("the start is"), "{}", printed.words);
+    assert!(
+        printed.words.contains("the start point is"),
+        "{}",
+        printed.words
+    );
     assert!(
         String::from_utf8(printed.out)
             .unwrap()

@@ -310,7 +310,7 @@ fn messages_have_the_clock_of_the_file() {
         ("reduce path.tum -o r.tum", "(body, 1305031098.600 s)"),
         (
             "eval path.tum --fps 7 -o a.bvh",
-            "the clip ends at 1305031099.3 s, between two frames at 7 fps; one more frame, at 1305031099.314286 s",
+            "the clip ends at 1305031099.3 s, between two frames at 7 fps; a last frame, at 1305031099.314286 s",
         ),
         (
             "verify path.tum -m slerp --fps 4 --device cpu",

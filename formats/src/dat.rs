@@ -103,7 +103,8 @@ fn read_header<R: BufRead>(lines: &mut Lines<R>) -> Result<DatHeader, Diagnostic
         return Err(Diagnostic::empty(lines.file()));
     };
     let Some(body) = line.trim_start().strip_prefix('#') else {
-        let message = "no header; the first line is `# <boxes> <box length>`".to_owned();
+        let message =
+            "no header; the first line of a .dat file must be `# <boxes> <box length>`".to_owned();
         return Err(lines.refuse(1, Code::NoHeader, message));
     };
     let before = (line.len() - body.len()) as u64;

@@ -214,8 +214,8 @@ fn a_frame_time_without_a_rate_is_replaced() {
                 panic!("{:?}", loaded.warnings);
             };
             let message = format!(
-                "a frame time of {written} s; it is from 1e-9 to 1e9; because of --override-fps it is read at 30 \
-                 frames a second"
+                "a frame time of {written} s is out of range (1e-9 to 1e9 s); because of --override-fps it is read at \
+                 30 frames a second"
             );
             assert_eq!((warning.code, &warning.message), (Code::TwoRates, &message));
         }

@@ -81,7 +81,7 @@ fn a_track_without_a_name_is_called_as_in_results() {
     assert_eq!(said.code, Code::Bridged);
     assert!(
         said.message
-            .contains("the track `box1` lacks 1 of its keys"),
+            .contains("1 key of the track `box1` without a value left out"),
         "{said}"
     );
 }

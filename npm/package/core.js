@@ -1,12 +1,12 @@
-// The border to the WebAssembly module: clips, and what they are at times. `index.js` and `node.js` say where
-// the module lies.
+// The interface to the WebAssembly module: clips, their samples and samplers. `index.js` (browsers) and `node.js` load the
+// module's bytes.
 
 const CALLS = { about: 0, unpack: 1, read: 2, sample: 3, keys: 4, free: 5, sampler: 6, freeSampler: 7 };
 const EVERY_TRACK = 0xffffffff;
 const text = new TextEncoder();
 const words = new TextDecoder();
 
-/** What the engine, a file or an argument is refused for. `code` is a file's fault by the name in docs/codes.md. */
+/** An error of the engine, a file or an argument. `code`: the code of a file's error, as in docs/codes.md; otherwise null. */
 export class TumbleError extends Error {
   constructor(message, code = null) {
     super(message);
@@ -15,14 +15,14 @@ export class TumbleError extends Error {
   }
 }
 
-/** The engine: one instance of the module, with its memory. */
+/** An instance of the WebAssembly module with its memory. */
 class Module {
   constructor(instance) {
     this.exports = instance.exports;
     this.broken = null;
   }
 
-  /** Makes a call; its answer's JSON, with a property for each array. */
+  /** Executes a call. Returns the answer's JSON, in which each array is a property of its name. */
   call(name, header, numbers = new Uint8Array(0)) {
     const json = text.encode(JSON.stringify(header));
     const bytes = json.length + numbers.byteLength;
@@ -37,7 +37,7 @@ class Module {
     });
   }
 
-  /** Copies the rotations of a sampler at a time, of a track or of every one, to an array of their length. */
+  /** Samples one track or all (EVERY_TRACK) at a time [s], and copies x y z w of each to `out`, which has this length. */
   pose(sampler, track, time, out) {
     return this.attempt(() => {
       const at = this.exports.tumble_pose(sampler, track, time) >>> 0;
@@ -47,14 +47,14 @@ class Module {
     });
   }
 
-  /** Runs what calls the instance, which must not have stopped before. */
+  /** Runs a function that calls the instance. If the instance traps, this and all later calls throw TumbleError. */
   attempt(run) {
     if (this.broken) throw new TumbleError(`${this.broken}; load the package's engine anew (load())`);
     try {
       return run();
     } catch (error) {
       if (error instanceof TumbleError) throw error;
-      // An instance that stopped in the middle of a call is in no state to be called again.
+      // A trap in the middle of a call leaves the module's state inconsistent, so it is not called again.
       this.broken = `the engine stopped: ${error.message}; it may have run out of memory`;
       throw new TumbleError(this.broken);
     }
@@ -81,7 +81,7 @@ function numbers(value, kind, components, what) {
   if (!isNumbers(value)) throw new TumbleError(`${what} are no array of numbers, but ${typeof value}`);
   const flat = Array.isArray(value) ? value.flat(2) : value;
   for (let i = 0; i < flat.length; i++) {
-    // A hole or a text would become NaN or a number in silence.
+    // Typed arrays would silently convert holes to NaN and strings to numbers.
     if (typeof flat[i] !== "number") throw new TumbleError(`${what}: number ${i} is ${String(flat[i])}, no number`);
   }
   const array = kind.from(flat);
@@ -91,7 +91,7 @@ function numbers(value, kind, components, what) {
   return array;
 }
 
-/** Bytes of a track's numbers in the order of formats/src/motion/packed.rs, and its header. */
+/** A track's header and number arrays, in the order that formats/src/motion/packed.rs reads. `before`: the times of the track before it, which are not repeated if equal. */
 function packedTrack(track, index, before) {
   const what = (name) => `track ${index}${track.name ? ` (${track.name})` : ""}: ${name}`;
   const known = ["name", "times", "rotations", "translations", "scales", "parent", "rest", "interpolation", "tangents"];
@@ -145,7 +145,7 @@ function packedTrack(track, index, before) {
   return { header, parts, times };
 }
 
-/** Tracks in one piece, as formats/src/motion/packed.rs has them. */
+/** Tracks as bytes in the form of formats/src/motion/packed.rs. */
 function packed(tracks, { name = null, isWorld = false } = {}) {
   if (!Array.isArray(tracks)) throw new TumbleError("tracks are no array");
   let before = null;
@@ -178,24 +178,24 @@ function packed(tracks, { name = null, isWorld = false } = {}) {
 const CURVE_OPTIONS = ["method", "ends", "signs", "speed", "before", "after", "tension", "continuity", "bias"];
 const OPTIONS = [...CURVE_OPTIONS, "layout", "axes"];
 
-/** The header of a call for a quantity with these options, of which there are those in a list. */
+/** The header of a call for a quantity; throws if an option is not in the list `known`. */
 function headerOf(quantity, options, known) {
   const header = { quantity };
   for (const [name, value] of Object.entries(options)) {
     // `path` is the name that `signs` had before.
     if (!known.includes(name) && name !== "path") throw new TumbleError(`there is no option \`${name}\`; there are ${known.join(", ")}`);
-    // Digits are kept as text: JSON's readers may round a number in its last place.
+    // Numbers are passed as text, because readers of JSON may round their last digit.
     if (value !== undefined) header[name] = typeof value === "number" ? String(value) : value;
   }
   return header;
 }
 
-/** Tracks that belong together, ready to be sampled. */
+/** A clip: tracks with their keys, stored in the module's memory. */
 export class Clip {
   #module;
   #handle;
 
-  /** For this package alone: clips are made by `Tumble.clip`, `Tumble.read` and `Tumble.unpack`. */
+  /** Internal: `Tumble.clip`, `Tumble.read` and `Tumble.unpack` create clips. */
   constructor(module, found) {
     this.#module = module;
     this.#handle = { module, call: "free", header: { clip: found.clip }, isFreed: false };
@@ -233,7 +233,7 @@ export class Clip {
     return this.#call("sample", header, new Uint8Array(list.buffer, list.byteOffset, list.byteLength));
   }
 
-  /** Rotations, and translations and scales where there are any. */
+  /** Rotations x y z w; translations and scales x y z, or null if no track has any. */
   sample(times, options = {}) {
     const found = this.#sample("pose", times, options);
     return { translations: null, scales: null, ...found };
@@ -254,12 +254,12 @@ export class Clip {
     return this.#sample("world", times, options);
   }
 
-  /** A matrix for each joint that takes it to the world, column after column. */
+  /** A matrix for each joint, from its axes to the world: 16 numbers, column-major. */
   matrices(times, options = {}) {
     return this.#sample("matrices", times, options);
   }
 
-  /** Rotations at one time after another, for what is drawn or controlled now. */
+  /** A sampler: rotations at one time after another, such as the frames of a game. */
   sampler(options = {}) {
     return new Sampler(this.#module, this.#call("sampler", headerOf("pose", options, CURVE_OPTIONS)));
   }
@@ -270,7 +270,7 @@ export class Clip {
     return { translationTimes: null, translations: null, scaleTimes: null, scales: null, ...found };
   }
 
-  /** Gives its memory back; the clip is of no use then. */
+  /** Frees the clip's memory. The clip cannot be used afterwards. */
   free() {
     free(this.#handle);
   }
@@ -281,7 +281,7 @@ export class Sampler {
   #module;
   #handle;
 
-  /** For this package alone: samplers are made by `Clip.sampler`. */
+  /** Internal: `Clip.sampler` creates samplers. */
   constructor(module, { sampler, tracks }) {
     this.#module = module;
     this.#handle = { module, call: "freeSampler", header: { sampler }, isFreed: false };
@@ -299,12 +299,12 @@ export class Sampler {
     return this.#module.pose(this.#handle.header.sampler, track, time, out);
   }
 
-  /** The rotations of all tracks at a time. */
+  /** The rotations x y z w of all tracks at a time [s]. */
   pose(time, out = new Float32Array(4 * this.tracks)) {
     return this.#rotations(EVERY_TRACK, time, out, 4 * this.tracks);
   }
 
-  /** The rotation of a track at a time. */
+  /** The rotation x y z w of a track at a time [s]. */
   sample(track, time, out = new Float32Array(4)) {
     if (!Number.isInteger(track) || track < 0 || track >= this.tracks) {
       throw new TumbleError(`there is no track ${String(track)} of ${this.tracks}; they count from 0`);
@@ -312,7 +312,7 @@ export class Sampler {
     return this.#rotations(track, time, out, 4);
   }
 
-  /** Gives its memory back; the sampler is of no use then. */
+  /** Frees the sampler's memory. The sampler cannot be used afterwards. */
   free() {
     free(this.#handle);
   }
@@ -329,14 +329,14 @@ function release(handle) {
   if (!handle.module.broken) handle.module.call(handle.call, handle.header);
 }
 
-// Clips and samplers that nobody has any more give their memory back when the garbage is collected.
+// Frees clips and samplers that are garbage-collected without a call of free(); their memory is in the module.
 const forgotten = globalThis.FinalizationRegistry && new FinalizationRegistry(release);
 
 /** The engine in this page, worker or process. */
 export class Tumble {
   #module;
 
-  /** For this package alone: `load` makes it. */
+  /** Internal: `load` creates it. */
   constructor(instance) {
     this.#module = new Module(instance);
     const { version, methods, formats } = this.#module.call("about", {});
@@ -345,17 +345,17 @@ export class Tumble {
     this.formats = formats;
   }
 
-  /** A clip of arrays. */
+  /** A clip from arrays of times and keys. */
   clip(tracks, options) {
     return this.unpack(packed(tracks, options));
   }
 
-  /** A clip in one piece of bytes, as the program's pages carry it. */
+  /** A clip from bytes in the packed form that pages of `tumble view` contain. */
   unpack(bytes) {
     return new Clip(this.#module, this.#module.call("unpack", {}, bytesOf(bytes)));
   }
 
-  /** The clips of a file. */
+  /** Reads the clips of a file from its bytes. `name`: for messages, and to recognise the format by its extension. */
   read(bytes, { name = "file", sourceRate } = {}) {
     const header = { name, sourceRate: sourceRate === undefined ? null : String(sourceRate) };
     const { clips, warnings, refused } = this.#module.call("read", header, bytesOf(bytes));
@@ -369,19 +369,19 @@ function bytesOf(value) {
   throw new TumbleError("bytes are an ArrayBuffer, or an array of bytes such as Uint8Array");
 }
 
-/** What a clip is at times: `clip.sample(times, options)`. */
+/** The poses of a clip at times: `clip.sample(times, options)`. */
 export function sample(clip, times, options) {
   return clip.sample(times, options);
 }
 
-/** The engine of a module: its bytes, or what WebAssembly.compile makes of them. */
+/** Starts the engine from the module's bytes or from a compiled WebAssembly.Module. */
 export async function loadFrom(module) {
   const isCompiled = module instanceof WebAssembly.Module;
   const compiled = isCompiled ? module : await WebAssembly.compile(bytesOf(module));
   return new Tumble(await WebAssembly.instantiate(compiled, imports(compiled)));
 }
 
-/** The engine needs nothing of the page. What a library in it asks for (random numbers, to encrypt archives) is never called. */
+/** Imports for the module. A library in it imports random numbers (to encrypt archives), but never calls them; each import throws. */
 function imports(compiled) {
   const found = {};
   for (const { module, name } of WebAssembly.Module.imports(compiled)) {

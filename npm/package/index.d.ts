@@ -13,7 +13,7 @@ export interface CurveOptions {
   method?: Method;
   /** The boundary condition at the first and the last key. Default: depends on the method. */
   ends?: "parabolic" | "natural" | "clamped" | "secant" | "loop" | "frozen";
-  /** Which way to rotate between neighbouring keys. Default: `shortest`. */
+  /** Whether to rotate the shorter way between neighbouring keys, or as their signs say (`q` and `-q` differ). Default: `shortest`. */
   signs?: "shortest" | "as-authored";
   /** The speed along the curve. Default: `as-keyed`. */
   speed?: "as-keyed" | "constant";
@@ -110,7 +110,7 @@ export interface VectorKeys {
   times: ArrayLike<number>;
   /** `x y z` for each time. */
   values: ArrayLike<number>;
-  /** For `cubic`: the arriving and the leaving tangent of each key, units per second. */
+  /** For `cubic`: the in-tangent and the out-tangent of each key, units per second. */
   tangents?: ArrayLike<number>;
 }
 
@@ -121,7 +121,7 @@ export interface Track {
   times?: ArrayLike<number>;
   /** Unit quaternions `x y z w`, one for each time. */
   rotations?: ArrayLike<number>;
-  /** For `cubic`: the arriving and the leaving tangent of each key, per second. */
+  /** For `cubic`: the in-tangent and the out-tangent of each key, per second. */
   tangents?: ArrayLike<number>;
   translations?: VectorKeys;
   scales?: VectorKeys;

@@ -1,10 +1,10 @@
-// For browsers, and for every environment in which `fetch` can load a file next to a script.
+// Entry point for browsers, and for other environments in which `fetch` can load a file next to the script.
 
 import { TumbleError, loadFrom } from "./core.js";
 
 export { Clip, Tumble, TumbleError, sample } from "./core.js";
 
-/** The engine. `source`: the module's bytes, its address or the answer to a request for it. */
+/** Loads the engine. `source`: the module's bytes, its URL, or a response with it. */
 export async function load(source = new URL("./tumble.wasm", import.meta.url)) {
   if (source instanceof WebAssembly.Module || source instanceof ArrayBuffer || ArrayBuffer.isView(source)) {
     return loadFrom(source);

@@ -1,4 +1,4 @@
-//! The answer to a call: JSON and arrays of numbers, or why it was not done.
+//! The answer to a call from JavaScript: JSON plus arrays of numbers, or an error.
 
 use std::error::Error;
 
@@ -7,14 +7,14 @@ use serde_json::{Value, json};
 #[cfg(feature = "files")]
 use tumble_formats::Diagnostic;
 
-/// The answer to a call.
+/// The answer to a call. `json` lists the arrays, because JavaScript copies each from its address in memory.
 #[derive(Default)]
 pub(crate) struct Answer {
     pub(crate) json: String,
     pub(crate) arrays: Vec<Array>,
 }
 
-/// Numbers of an answer.
+/// An array of an answer. JavaScript sees vectors and quaternions as f32, three or four for each.
 pub(crate) enum Array {
     F64(Vec<f64>),
     F32(Vec<f32>),
@@ -41,7 +41,7 @@ impl Array {
 }
 
 impl Answer {
-    /// The JSON, with the names, kinds and lengths of the arrays in it.
+    /// An answer whose JSON gets the list `arrays`: the name, the kind (`f32`, `f64`) and the bytes of each array.
     pub(crate) fn new(mut json: Value, arrays: Vec<(&'static str, Array)>) -> Self {
         let listed = arrays.iter().map(|(name, array)| {
             json!({"name": name, "kind": array.kind(), "bytes": array.bytes().len()})
@@ -54,7 +54,7 @@ impl Answer {
     }
 }
 
-/// Why a call was not done.
+/// The error of a call; `code` is the code of a file's error, such as `E011`.
 #[derive(Debug)]
 pub(crate) struct Fault {
     code: Option<&'static str>,

@@ -1,4 +1,4 @@
-//! The calls, by their numbers, and the clips and samplers that JavaScript has handles of.
+//! The calls of the interface, by number, and the clips and samplers to which JavaScript has handles.
 
 use glam::Quat;
 use serde::Deserialize;
@@ -13,7 +13,7 @@ use tumble_formats::{Diagnostic, Format, ReadOptions};
 use crate::answer::{Answer, Array, Fault};
 use crate::sampling::{self, SampleCall};
 
-/// All that lasts from call to call.
+/// The state between calls. A handle in JavaScript is an index into `clips` or `samplers`; freed slots are `None`.
 #[derive(Default)]
 pub(crate) struct Calls {
     engine: Option<Engine>,
@@ -21,27 +21,27 @@ pub(crate) struct Calls {
     samplers: Vec<Option<KeptSampler>>,
 }
 
-/// A sampler, and room for the pose that it gave last.
+/// A sampler with memory for one pose, so that sampling does not allocate. JavaScript reads the pose from there.
 struct KeptSampler {
     sampler: Sampler,
     pose: Vec<Quat>,
 }
 
-/// A sampler that a call is about.
+/// The header of calls about a sampler: its handle.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct SamplerHeader {
     sampler: usize,
 }
 
-/// A clip that a call is about.
+/// The header of calls about a clip: its handle.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct ClipHeader {
     clip: usize,
 }
 
-/// A track of a clip.
+/// The header of calls about one track: the clip's handle and the index of the track.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct TrackHeader {
@@ -49,18 +49,18 @@ struct TrackHeader {
     track: usize,
 }
 
-/// A file whose bytes come behind.
+/// The header of the call `read`. The bytes of the file follow it.
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase", deny_unknown_fields)]
-#[cfg_attr(not(feature = "files"), allow(dead_code))] // no file is read then
+#[cfg_attr(not(feature = "files"), allow(dead_code))] // without the feature, `read` refuses every file
 struct FileHeader {
     name: String,
-    /// The rate of the keys, where the file does not say it.
+    /// The rate of the keys [frames per second], for files that state none.
     source_rate: Option<String>,
 }
 
 impl Calls {
-    /// Makes a call. `numbers` is what came behind the header.
+    /// Executes a call. `numbers` are the bytes after the header: sample times, packed tracks, or a file.
     pub(crate) fn call(
         &mut self,
         call: u32,
@@ -80,15 +80,15 @@ impl Calls {
         }
     }
 
-    /// Makes a clip of its packed bytes.
+    /// Stores a clip from the packed bytes that `core.js` or `tumble view` made (`tumble_formats::packed`).
     fn unpack(&mut self, bytes: &[u8]) -> Result<Answer, Fault> {
         let clip = packed::from_bytes(bytes)?;
         Ok(Answer::new(self.keep(clip), Vec::new()))
     }
 
-    /// Refuses files.
+    /// Refuses the file: pages of `tumble view` contain an engine without formats, because it is smaller.
     #[cfg(not(feature = "files"))]
-    #[allow(clippy::unused_self)] // as where files are read
+    #[allow(clippy::unused_self)] // the same signature as with the feature `files`
     fn read(&mut self, file: FileHeader, _: Vec<u8>) -> Result<Answer, Fault> {
         let FileHeader {
             name,
@@ -97,7 +97,7 @@ impl Calls {
         Err(Fault::new(format!("{name}: this engine reads no files")))
     }
 
-    /// Reads the clips of a file.
+    /// Reads the clips of a file and stores them. Fails if no clip can be read; otherwise `refused` lists the errors.
     #[cfg(feature = "files")]
     fn read(&mut self, file: FileHeader, bytes: Vec<u8>) -> Result<Answer, Fault> {
         let mut options = ReadOptions::default();
@@ -125,7 +125,7 @@ impl Calls {
         sampling::sample(engine, find(&self.clips, call.clip)?, call, numbers)
     }
 
-    /// Makes a sampler of a clip.
+    /// Uploads a clip and creates a sampler of it. The sampler stays valid after the clip is freed.
     fn sampler(&mut self, call: &SampleCall) -> Result<Answer, Fault> {
         let engine = made(&mut self.engine)?;
         let sampler = sampling::sampler(engine, find(&self.clips, call.clip)?, call)?;
@@ -138,7 +138,7 @@ impl Calls {
         ))
     }
 
-    /// The rotations of a sampler at a time: of one track, or of every one. Nothing is allocated.
+    /// The rotations of a sampler at a time: of one track, or of all if `track` is `None`. Does not allocate.
     pub(crate) fn pose(
         &mut self,
         sampler: usize,
@@ -167,7 +167,7 @@ impl Calls {
         Ok(Answer::new(json!({}), Vec::new()))
     }
 
-    /// The keys of a track.
+    /// The keys of a track: times [s], rotations, and translations and scales if it has any.
     fn keys(&self, of: &TrackHeader) -> Result<Answer, Fault> {
         let set = &find(&self.clips, of.clip)?.set;
         let track = set.get(of.track).ok_or_else(|| {
@@ -199,7 +199,7 @@ impl Calls {
         Ok(Answer::new(json!({}), Vec::new()))
     }
 
-    /// Keeps a clip, and says what JavaScript is to know of it.
+    /// Stores a clip. Returns its handle (`clip`) and the properties that JavaScript's `Clip` shows.
     fn keep(&mut self, clip: Motion) -> Value {
         let set = &clip.set;
         let tracks = 0..set.track_count();
@@ -221,7 +221,7 @@ impl Calls {
     }
 }
 
-/// The engine, which is made for the first call that needs it.
+/// The engine. It is created by the first call that needs it.
 fn made(engine: &mut Option<Engine>) -> Result<&Engine, Fault> {
     Ok(match engine {
         Some(engine) => engine,
@@ -251,14 +251,14 @@ fn find(clips: &[Option<Motion>], clip: usize) -> Result<&Motion, Fault> {
 
 fn read_header<T: DeserializeOwned>(header: &[u8]) -> Result<T, Fault> {
     serde_json::from_slice(header).map_err(|error| {
-        // Where in a text that nobody wrote says nothing to anybody.
+        // The JSON is generated by core.js, so its line and column would not help a user: they are removed.
         let text = error.to_string();
         let message = text.split(" at line ").next().unwrap_or(&text);
         Fault::new(message)
     })
 }
 
-/// The version, the methods and the formats.
+/// The answer to the call `about`: the version, the methods and the formats.
 fn about() -> Answer {
     let methods = METHODS.iter().map(|method| {
         json!({
@@ -275,7 +275,7 @@ fn about() -> Answer {
     Answer::new(json, Vec::new())
 }
 
-/// The names of the formats that are read.
+/// The names of the formats that `read` supports; none without the feature `files`.
 fn formats() -> Vec<&'static str> {
     #[cfg(feature = "files")]
     return tumble_formats::FORMATS

@@ -1,13 +1,13 @@
 //! Tumble for JavaScript: the WebAssembly module behind the npm package `tumble`.
 //!
-//! A call is a number (`calls`), a header in JSON and bytes behind it; its answer is JSON and arrays of
-//! numbers. JavaScript writes the call where [`tumble_input`] says, and copies the answer from where it lies. Only the
-//! poses of samplers, of which programs want many, come without JSON ([`tumble_pose`]):
-//! six functions and no generated code. `npm/package/core.js` is the other side.
+//! The interface has six functions and no generated code. A call is a number (`calls`), a header in JSON, and bytes after
+//! it; its answer is JSON plus arrays of numbers. JavaScript writes the call to the address from [`tumble_input`], and
+//! copies the answer from the module's memory. Poses of samplers come without JSON ([`tumble_pose`]), because programs
+//! request thousands per second. `npm/package/core.js` is the caller.
 
-// Tests may use what systems round differently (clippy.toml).
+// Tests may use functions whose rounding depends on the system (clippy.toml).
 #![cfg_attr(test, allow(clippy::disallowed_methods))]
-// Names that JavaScript finds; there is no block of unsafe code.
+// `no_mangle` counts as unsafe code. The exports need it to have names; there are no unsafe blocks.
 #![allow(unsafe_code)]
 
 mod answer;
@@ -33,7 +33,7 @@ thread_local! {
     static BORDER: RefCell<Border> = RefCell::new(Border::default());
 }
 
-/// Makes room for a call of so many bytes. Its address; 0 where there is not so much memory.
+/// Allocates the input of a call, `bytes` long. Returns its address, or 0 if there is not enough memory.
 #[unsafe(no_mangle)]
 pub extern "C" fn tumble_input(bytes: usize) -> *mut u8 {
     BORDER.with_borrow_mut(|border| {
@@ -48,8 +48,8 @@ pub extern "C" fn tumble_input(bytes: usize) -> *mut u8 {
     })
 }
 
-/// Makes the call of that number; the first bytes of the input are its header. 1 where it was done, 0 where the
-/// answer says why not.
+/// Executes the call with this number; the first `header_bytes` of the input are its header. Returns 1, or 0 on error;
+/// the answer then contains the error.
 #[unsafe(no_mangle)]
 pub extern "C" fn tumble_call(call: u32, header_bytes: usize) -> u32 {
     BORDER.with_borrow_mut(|border| {
@@ -68,11 +68,11 @@ pub extern "C" fn tumble_call(call: u32, header_bytes: usize) -> u32 {
     })
 }
 
-/// The track that stands for all of them.
+/// The value of `track` that selects all tracks.
 const EVERY_TRACK: u32 = u32::MAX;
 
-/// Where the rotations of a sampler at a time lie, four f32 each: of one track, or of every one if `track` is
-/// 2^32 - 1. 0 where the answer says why there are none.
+/// Samples a sampler at a time [s]: one track, or all if `track` is 2^32 - 1. Returns the address of the rotations, four
+/// f32 each, or 0 on error; the answer then contains the error.
 #[unsafe(no_mangle)]
 pub extern "C" fn tumble_pose(sampler: usize, track: u32, time: f64) -> *const u8 {
     let track = (track != EVERY_TRACK).then_some(track as usize);
@@ -85,19 +85,19 @@ pub extern "C" fn tumble_pose(sampler: usize, track: u32, time: f64) -> *const u
     })
 }
 
-/// Where the answer's JSON lies.
+/// The address of the answer's JSON.
 #[unsafe(no_mangle)]
 pub extern "C" fn tumble_answer() -> *const u8 {
     BORDER.with_borrow(|border| border.answer.json.as_ptr())
 }
 
-/// How many bytes it has.
+/// The length of the answer's JSON, bytes.
 #[unsafe(no_mangle)]
 pub extern "C" fn tumble_answer_bytes() -> usize {
     BORDER.with_borrow(|border| border.answer.json.len())
 }
 
-/// Where an array of the answer lies, of which its JSON says how long it is; 0 for none.
+/// The address of array `index` of the answer, or 0 if there is none. The answer's JSON contains its length.
 #[unsafe(no_mangle)]
 pub extern "C" fn tumble_array(index: usize) -> *const u8 {
     BORDER.with_borrow(|border| {

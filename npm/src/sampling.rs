@@ -1,4 +1,4 @@
-//! The samples of clips that JavaScript asks for.
+//! Samples clips at the times of a call: poses, velocities, world positions, matrices.
 
 use std::collections::BTreeMap;
 use std::str::FromStr;
@@ -17,21 +17,21 @@ use tumble_formats::world::{world, world_matrices};
 
 use crate::answer::{Answer, Array, Fault};
 
-/// The header of a call for samples. Decimal numbers come as text, which keeps all their digits.
+/// The header of a call for samples. Numbers of options come as text, because readers of JSON may round their last digit.
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub(crate) struct SampleCall {
     pub(crate) clip: usize,
     quantity: Sampled,
-    /// Of frames; the numbers are their start and end then, and else the times.
+    /// The frame rate. If set, the call's numbers are the start and the end of the frames [s]; otherwise they are the times.
     rate: Option<String>,
-    /// `authored`, as the file says of each channel, where nothing is said.
+    /// The name of the method. Default: `authored`, the interpolation that the file states for each channel.
     method: Option<String>,
     #[serde(default, deserialize_with = "option")]
     layout: Option<Layout>,
     #[serde(default, deserialize_with = "option")]
     axes: Option<Axes>,
-    /// The options of [`InterpolationOption`] by their names.
+    /// Values of options of the curve by the names of [`InterpolationOption`].
     #[serde(flatten)]
     options: BTreeMap<String, Option<String>>,
 }
@@ -52,7 +52,7 @@ enum Sampled {
     Matrices,
 }
 
-/// The value of an option of the engine, by its name.
+/// Parses the name of a layout or of axes.
 fn option<'de, D: Deserializer<'de>, T: FromStr<Err = UnknownNameError>>(
     deserializer: D,
 ) -> Result<Option<T>, D::Error> {
@@ -107,7 +107,7 @@ impl SampleCall {
         }
     }
 
-    /// Values that came a sample after the other, in the order asked for.
+    /// Reorders values from sample by sample to the layout of the call, which is track by track by default.
     fn ordered<T: Copy>(&self, values: Vec<T>, tracks: usize) -> Vec<T> {
         if self.layout == Some(Layout::FrameMajor) || tracks < 2 {
             return values;
@@ -121,8 +121,8 @@ impl SampleCall {
     }
 }
 
-/// Bytes that a sample of a track takes at most while it is made: its rotation, translation, scale, and what
-/// becomes of them, in both orders.
+/// The largest memory per sample and track during a call, bytes: rotation, translation and scale, their results, and
+/// the copy in the other layout.
 const SAMPLE: f64 = 200.0;
 
 /// Samples a clip at the times of a call.
@@ -138,7 +138,7 @@ pub(crate) fn sample(
     let frames = call.frames(&numbers)?;
     let timeline = frames.resolve(tracks, clip.set.time_span())?;
     let bytes = tracks as f64 * timeline.len() as f64 * SAMPLE;
-    // The platform does not say how much memory there is; reserving it does.
+    // WebAssembly has no query for free memory, so the memory is reserved on trial before anything is computed.
     let has_room = bytes < usize::MAX as f64 / 2.0
         && Vec::<u8>::new().try_reserve_exact(bytes as usize).is_ok();
     if !has_room {
@@ -192,7 +192,7 @@ pub(crate) fn sample(
     ))
 }
 
-/// A sampler of a clip's rotations.
+/// Uploads a clip's rotations for the method of the call, and creates a sampler of them.
 pub(crate) fn sampler(engine: &Engine, clip: &Motion, call: &SampleCall) -> Result<Sampler, Fault> {
     let interpolations = call.methods()?.interpolations(clip);
     Ok(engine.upload(&clip.set, interpolations)?.sampler()?)

@@ -1,4 +1,4 @@
-//! The calls as JavaScript makes them, without it.
+//! Calls as JavaScript makes them, but from Rust. `npm/tests` has those that need JavaScript.
 
 use glam::{Quat, Vec3};
 use serde_json::{Value, json};
@@ -72,7 +72,7 @@ fn samples_have_the_engine_s_bits_in_both_orders() {
                     };
                     let rotation = Quat::from_slice(&found[4 * at..]);
                     let right = right.get(track, sample).unwrap();
-                    // Signs continue along a track, as in files.
+                    // Neighbouring samples of a track get the nearer sign here, as in files; the engine returns either.
                     assert!(
                         rotation == right || rotation == -right,
                         "{method} {layout} {at}"
@@ -83,7 +83,7 @@ fn samples_have_the_engine_s_bits_in_both_orders() {
     }
 }
 
-/// Poses and single tracks, of a sampler that outlives its clip.
+/// Poses and single tracks of a sampler have the bits of samples at listed times, also after its clip was freed.
 #[test]
 fn samplers_have_the_bits_of_listed_times() {
     let (clip, mut calls) = (clip(), Calls::default());

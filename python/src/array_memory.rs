@@ -11,11 +11,11 @@ use crate::errors::device;
 pub(crate) const CPU: i32 = 1;
 pub(crate) const CUDA: i32 = 2;
 
-/// The memory of one array or several.
+/// The memory of one or several arrays.
 pub(crate) enum ArrayMemory {
-    /// Of a card that CUDA has.
+    /// Memory of a card that CUDA has.
     Card(Mapping),
-    /// Of the host, complete.
+    /// Memory of the host; the result in it is complete.
     Host(MappedStates),
 }
 
@@ -25,7 +25,7 @@ impl ArrayMemory {
         Mapping::new(result).map(Self::Card)
     }
 
-    /// Its device, as DLPack numbers devices.
+    /// The device, as DLPack numbers devices: (type, index).
     pub(crate) fn device(&self) -> (i32, i32) {
         match self {
             Self::Card(mapping) => (CUDA, mapping.ordinal),
@@ -33,7 +33,7 @@ impl ArrayMemory {
         }
     }
 
-    /// The address of its first byte.
+    /// The address of the first byte.
     pub(crate) fn address(&self) -> usize {
         match self {
             Self::Card(mapping) => mapping.address() as usize,
@@ -56,7 +56,7 @@ impl ArrayMemory {
     }
 }
 
-/// CUDA's refusal, with the remedy in Python.
+/// The exception for an error of CUDA, with the remedy in Python.
 pub(crate) fn of_cuda(error: &CudaError) -> PyErr {
     device(&format!(
         "device_array: {error}; without device_array=True results are arrays of NumPy's"

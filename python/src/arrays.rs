@@ -55,7 +55,7 @@ pub(crate) struct ArrayValues<T> {
     pub(crate) values: Vec<T>,
 }
 
-/// A borrowed array of one of the two types that are taken as they are.
+/// A borrowed float32 or float64 array, which is used without a conversion.
 enum Array<'py> {
     Single(PyReadonlyArrayDyn<'py, f32>),
     Double(PyReadonlyArrayDyn<'py, f64>),
@@ -77,7 +77,7 @@ pub(crate) fn numpy(py: Python<'_>) -> PyResult<&Bound<'_, PyModule>> {
     Ok(module.bind(py))
 }
 
-/// The NumPy array of an object: itself, or by the array protocol or DLPack.
+/// Converts an object to a NumPy array: the array itself, or by the array protocol or DLPack.
 fn as_array<'py>(value: &Bound<'py, PyAny>, label: &str) -> PyResult<Bound<'py, PyUntypedArray>> {
     let py = value.py();
     if let Ok(array) = value.cast_exact::<PyUntypedArray>() {
@@ -121,7 +121,7 @@ fn array<'py>(value: &Bound<'py, PyAny>, label: &str) -> PyResult<Array<'py>> {
     borrowed(&converted)?.ok_or_else(|| input(format!("{label}: it is not an array of numbers")))
 }
 
-/// An array of a type and an alignment that can be read where it lies.
+/// The array, if its type and alignment allow to read it without a copy.
 fn borrowed<'py>(value: &Bound<'py, PyAny>) -> PyResult<Option<Array<'py>>> {
     let of_borrow = |error: numpy::BorrowError| PyValueError::new_err(error.to_string());
     if let Ok(array) = value.cast::<PyArrayDyn<f32>>()
@@ -148,7 +148,7 @@ pub(crate) fn is_aligned(start: usize, strides: &[isize], to: usize) -> bool {
             .all(|stride| stride.unsigned_abs().is_multiple_of(to))
 }
 
-/// The numbers as they lie in memory, where that is C order. (`as_slice` takes Fortran's too.)
+/// The numbers as a slice of the array's memory, if this is in C order. (`as_slice` also accepts Fortran order.)
 fn in_order<'a, T: numpy::Element>(array: &'a PyReadonlyArrayDyn<'_, T>) -> Option<&'a [T]> {
     array.as_slice().ok().filter(|_| array.is_c_contiguous())
 }
@@ -278,11 +278,11 @@ fn fours<T: Copy + Default>(
     (0..count).map(next)
 }
 
-/// From so many bytes on it is asked whether the system has them: it may promise more.
+/// From this number of bytes, free memory is checked first, because the system may promise more memory than it has.
 const LARGE: usize = 1 << 28;
 
-/// Room for so many values of an argument. An array may be larger than memory: the elements of one that was broadcast
-/// share theirs.
+/// Allocates memory for the values of an argument. This may fail: a broadcast array may have more elements than memory
+/// has room for, because its elements share memory.
 fn room<T>(count: usize, label: &str) -> PyResult<Vec<T>> {
     check_room::<T>(count, label)?;
     let mut values = Vec::new();
@@ -292,7 +292,7 @@ fn room<T>(count: usize, label: &str) -> PyResult<Vec<T>> {
     }
 }
 
-/// Refuses more values than the system has memory for.
+/// Fails if the system has too little memory for this number of values.
 fn check_room<T>(count: usize, label: &str) -> PyResult<()> {
     let bytes = count.saturating_mul(size_of::<T>());
     let is_small = bytes < LARGE;
@@ -309,10 +309,10 @@ fn no_room<T>(count: usize, label: &str) -> PyErr {
     ))
 }
 
-/// A list that is an argument, of any kind of sequence.
+/// Reads an argument that is a list or another sequence.
 pub(crate) struct ListArgument<T>(pub(crate) Vec<T>);
 
-/// After so many elements Ctrl-C is looked for: taking them may call no Python code.
+/// After this number of elements, Ctrl-C is checked, because reading elements may call no Python code that would do so.
 const ELEMENTS: usize = 1 << 16;
 
 impl<'py, T: FromPyObjectOwned<'py>> FromPyObject<'_, 'py> for ListArgument<T> {
@@ -361,7 +361,7 @@ pub(crate) fn parts<'py>(value: &Bound<'py, PyAny>) -> PyResult<Option<Vec<Bound
     Ok((!is_number).then_some(parts))
 }
 
-/// Whether some parts of a list are arrays.
+/// Whether any element of a list is an array.
 pub(crate) fn has_arrays(parts: &[Bound<'_, PyAny>]) -> PyResult<bool> {
     for part in parts {
         if has_attribute(part, "shape")? {

@@ -48,7 +48,7 @@ impl Times {
     }
 }
 
-/// The option by which a call says which axis of its keys is that of the tracks.
+/// How a call states which axis of its keys is the axis of tracks.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum KeysLayout {
     /// By its argument `layout`, which may have been left out. Names of tracks speak for the order of the
@@ -57,7 +57,7 @@ pub(crate) enum KeysLayout {
         layout: Option<Layout>,
         has_names: bool,
     },
-    /// Not at all, as its `layout` is that of the result: by making a clip first.
+    /// It cannot, because its `layout` is that of the result. Messages then advise to make a `Clip` first.
     OfClip,
 }
 
@@ -79,11 +79,11 @@ impl KeysLayout {
     }
 }
 
-/// The keys of a clip as they were given.
+/// The keys of a clip as passed to the constructor.
 pub(crate) struct ClipKeys {
     times: Times,
     tracks: Tracks,
-    /// The keys are one track's alone.
+    /// Whether the keys are of a single track, without an axis of tracks.
     pub(crate) is_one: bool,
 }
 
@@ -167,10 +167,10 @@ impl ClipKeys {
     }
 }
 
-/// Keys of all tracks, one behind the other.
+/// The keys of all tracks, track after track.
 struct Tracks {
     keys: Vec<Quat>,
-    /// Where each track ends.
+    /// The index after the last key of each track.
     ends: Vec<usize>,
 }
 
@@ -184,13 +184,13 @@ impl Tracks {
         &self.keys[start..self.ends[track]]
     }
 
-    /// Whether there are tracks, and all have so many keys.
+    /// Whether there are tracks, and each has this number of keys.
     fn are_alike(&self, keys: usize) -> bool {
         keys > 0 && (0..self.len()).all(|track| self.of(track).len() == keys)
     }
 }
 
-/// The keys of tracks, and whether they are one track's alone.
+/// Reads the keys of all tracks, and whether there is a single track without an axis of tracks.
 fn tracks_of(
     value: &Bound<'_, PyAny>,
     order: Order,
@@ -248,7 +248,7 @@ fn tracks_of(
     }
 }
 
-/// The meaning of the two axes of keys: by `layout`; without it tracks and keys, where the shape is not ambiguous.
+/// The order of the two axes of keys: as `layout` says; without it (tracks, keys), if the shape is not ambiguous.
 fn layout_of(
     py: Python<'_>,
     [first, second]: [usize; 2],
@@ -293,7 +293,7 @@ fn layout_of(
     }
 }
 
-/// Rows of values, `each` of them together, as columns.
+/// Swaps the two axes of an array whose elements are `each` values.
 fn swapped<T: Copy>(values: &[T], [rows, columns]: [usize; 2], each: usize) -> Vec<T> {
     let mut found = Vec::with_capacity(values.len());
     for column in 0..columns {
@@ -305,7 +305,7 @@ fn swapped<T: Copy>(values: &[T], [rows, columns]: [usize; 2], each: usize) -> V
     found
 }
 
-/// The arguments for clips beside rotations.
+/// The arguments of `Clip` other than times and rotations.
 pub(crate) struct ClipArguments<'a, 'py> {
     pub(crate) parents: Option<Vec<Option<i64>>>,
     pub(crate) offsets: Option<&'a Bound<'py, PyAny>>,
@@ -355,13 +355,13 @@ pub(crate) fn put_scalars(clip: &mut Motion, scalars: &[ScalarRow]) -> PyResult<
     Ok(())
 }
 
-/// Why positions of joints are unknown.
+/// The reason why positions of joints are unknown.
 pub(crate) const NO_OFFSETS: &str = "the joints have parents, but no offsets; give `offsets`";
 
-/// The numbers of some tracks, by their indices.
+/// Numbers of the tracks that have any, by the index of the track.
 type TrackRows = Vec<(usize, Vec<f64>)>;
 
-/// The data of clips beside rotations, checked.
+/// The checked data of a clip other than times and rotations.
 pub(crate) struct ClipParts {
     skeleton: Vec<Joint>,
     has_offsets: bool,
@@ -373,7 +373,7 @@ pub(crate) struct ClipParts {
 }
 
 impl ClipArguments<'_, '_> {
-    /// Reads them, for a clip of so many tracks with these names.
+    /// Reads and checks the data, for a clip with this number of tracks and these names.
     pub(crate) fn read(
         &self,
         tracks: usize,
@@ -427,7 +427,7 @@ impl ClipArguments<'_, '_> {
 }
 
 impl ClipParts {
-    /// Sets them in a clip; the tangents have their components in `order`.
+    /// Stores the data in a clip; the components of tangents are in `order`.
     pub(crate) fn put_into(self, clip: &mut Motion, order: Order) -> PyResult<()> {
         clip.skeleton = self.skeleton;
         let of_track = |error: TrackError| of_track(&error);

@@ -56,19 +56,19 @@ pub(crate) struct Clip {
 pub(crate) struct Source {
     pub(crate) path: PathBuf,
     pub(crate) document: Option<Arc<dyn Document>>,
-    /// How many clips the file has, those that cannot be read too.
+    /// The number of clips in the file, including those that cannot be read.
     pub(crate) clips: usize,
     pub(crate) box_length: Option<f64>,
-    /// The warnings of reading it.
+    /// The warnings about the file.
     pub(crate) warnings: Vec<Diagnostic>,
-    /// How the clip differs from the file in its units, axes or offsets.
+    /// The changes of units, axes or offsets that were applied when the clip was read.
     pub(crate) adjustment: Option<Adjustment>,
-    /// The clip has other keys than the file.
+    /// Whether the keys of the clip differ from those in the file.
     pub(crate) is_changed: bool,
 }
 
 impl Clip {
-    /// The clip with other keys; the other contents of its file stay known.
+    /// The clip with other keys. It still refers to its file, so that saving keeps the other contents.
     pub(crate) fn with_keys(&self, motion: Motion) -> Self {
         let source = self.source.as_ref().map(|source| {
             Arc::new(Source {
@@ -94,14 +94,14 @@ impl Clip {
         Self { source, ..self }
     }
 
-    /// The length of each box, where the clip is of a file about boxes.
+    /// The length of each box, if the file contains boxes (.dat).
     pub(crate) fn box_length(&self) -> Option<f64> {
         self.source.as_ref().and_then(|source| source.box_length)
     }
 }
 
 impl Clip {
-    /// The index of a track, which is named by its index or its name.
+    /// The index of a track from its index or its name.
     pub(crate) fn track(&self, track: &Bound<'_, PyAny>) -> PyResult<usize> {
         let set = &self.motion.set;
         let tracks = set.track_count();

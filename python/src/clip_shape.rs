@@ -12,10 +12,10 @@ use crate::errors::{expected, guarded, input};
 use crate::names::unknown_name;
 use crate::options::{frame_rate, method_named};
 
-/// How clips are shaped.
+/// How clips are changed when a library reads them: which joints, and at which rate.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct ClipShape {
-    /// The rate of the keys; `None`: those of the file.
+    /// The rate at which clips are sampled; `None` keeps the keys of the file.
     rate: Option<FrameRate>,
     /// The joints, in this order; `None`: all.
     joints: Option<Vec<TrackName>>,
@@ -23,7 +23,7 @@ pub(crate) struct ClipShape {
 }
 
 impl ClipShape {
-    /// As keywords say. Without them it is that by default.
+    /// Reads the keywords; without any, clips are not changed.
     pub(crate) fn new(
         fps: Option<&Bound<'_, PyAny>>,
         tracks: Option<&Bound<'_, PyAny>>,
@@ -186,7 +186,7 @@ fn selected(clip: &Motion, joints: &[TrackName]) -> Result<Motion, String> {
     let name = |track: usize| clip.set.track_name(track);
     let parent = |track: usize| clip.skeleton.get(track).and_then(|joint| joint.parent);
     for &track in &tracks {
-        // The position relative to the parent would be lost.
+        // Without the parent, the position relative to it would be lost.
         if let Some(parent) = parent(track).filter(|parent| !tracks.contains(parent)) {
             return Err(format!(
                 "tracks: `{}` is a child of `{}`, which is left out; name that joint, too",

@@ -43,7 +43,7 @@ impl From<differences::Spread> for Spread {
 
 #[pymethods]
 impl Spread {
-    /// By its fields.
+    /// Pickles the fields.
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Pickled<'py>> {
         pickled(slf)
     }
@@ -83,7 +83,7 @@ value!(ArrayDifference {
 
 #[pymethods]
 impl ArrayDifference {
-    /// By its fields.
+    /// Pickles the fields.
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Pickled<'py>> {
         pickled(slf)
     }
@@ -185,7 +185,7 @@ impl From<differences::JointDifference> for JointDifference {
 
 #[pymethods]
 impl JointDifference {
-    /// By its fields.
+    /// Pickles the fields.
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Pickled<'py>> {
         pickled(slf)
     }
@@ -203,7 +203,7 @@ impl JointDifference {
 
 #[pymethods]
 impl ChannelDifference {
-    /// By its fields.
+    /// Pickles the fields.
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Pickled<'py>> {
         pickled(slf)
     }
@@ -261,7 +261,7 @@ value!(ClipDifference {
 
 #[pymethods]
 impl ClipDifference {
-    /// By its fields.
+    /// Pickles the fields.
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Pickled<'py>> {
         pickled(slf)
     }
@@ -316,7 +316,7 @@ impl From<differences::PathStatistics> for PathStatistics {
 
 #[pymethods]
 impl PathStatistics {
-    /// By its fields.
+    /// Pickles the fields.
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Pickled<'py>> {
         pickled(slf)
     }
@@ -379,7 +379,7 @@ value!(PathErrors {
 
 #[pymethods]
 impl PathErrors {
-    /// By its fields.
+    /// Pickles the fields.
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Pickled<'py>> {
         pickled(slf)
     }
@@ -502,7 +502,7 @@ fn of_clips(
             (pair.frames(&common, rate, start, end)).map_err(of_compare)?
         }
         Some(SampleChoice::Shared { times, .. }) => {
-            // The times are given, so a warning about the rates of the clips does not apply.
+            // With explicit times, a warning about the rates of the clips does not apply.
             warning = None;
             pair.at(&common, &times).map_err(of_compare)?
         }

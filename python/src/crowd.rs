@@ -20,10 +20,10 @@ use crate::output::{array_of, filled_bytes, quaternions_of};
 use crate::run::stoppable;
 use crate::samples::matrices;
 
-/// Ticks of a second, unless others are asked for.
+/// The default number of ticks per second.
 const TICKS: u32 = 705_600;
 
-/// Joints of an evaluation from which on Ctrl-C is looked for.
+/// Evaluations with at least this many joints run in a thread that Ctrl-C can stop; smaller ones end sooner than that.
 const MANY: usize = 1 << 20;
 
 /// Many instances of a skeleton, each of which plays clips at a separate time and speed: poses for skinning.
@@ -60,11 +60,11 @@ pub(crate) struct Crowd {
     joints: usize,
     layers: usize,
     clips: usize,
-    /// Why a clip has no positions.
+    /// For each clip, the reason why it has no positions.
     unplaced: Option<String>,
 }
 
-/// Numbers for each of some instances: one for all, or a list.
+/// A number for each of some instances: from one number for all, or from a list.
 fn each(value: &Bound<'_, PyAny>, name: &str, count: usize) -> PyResult<Vec<f64>> {
     let ArrayValues { shape, values } = doubles(value, name)?;
     match (&*shape, &*values) {
@@ -76,7 +76,7 @@ fn each(value: &Bound<'_, PyAny>, name: &str, count: usize) -> PyResult<Vec<f64>
     }
 }
 
-/// Whole numbers from 0 for each of some instances.
+/// An index for each of some instances, from one index for all, or from a list.
 fn indices(value: &Bound<'_, PyAny>, name: &str, count: usize) -> PyResult<Vec<usize>> {
     let whole = |number: f64| match number >= 0.0 && number.fract() == 0.0 && number < 1e15 {
         true => Ok(number as usize),

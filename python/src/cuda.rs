@@ -24,7 +24,7 @@ const LIBRARY: &str = match cfg!(windows) {
     false => "libcuda.so.1",
 };
 
-/// Why a result cannot be had by CUDA.
+/// The reason why a result cannot be used by CUDA.
 #[derive(Debug)]
 pub(crate) enum CudaError {
     /// There is no driver.
@@ -37,13 +37,13 @@ pub(crate) enum CudaError {
         code: c_int,
         name: String,
     },
-    /// CUDA sees no device that is the Vulkan device.
+    /// CUDA does not have the Vulkan device.
     NoDevice {
         device: String,
         uuid: String,
         seen: Vec<String>,
     },
-    /// The memory is not exported as CUDA imports it.
+    /// The Vulkan device does not export memory in a form that CUDA imports.
     #[cfg(not(unix))]
     NoFiles,
     /// The Vulkan device failed.
@@ -159,7 +159,7 @@ const _: () = {
     assert!(size_of::<Wait>() == 144);
 };
 
-/// The functions of the driver, by the names that its library has for them.
+/// The functions of the driver, with their names in its library.
 macro_rules! functions {
     ($($field:ident: $name:literal ($($argument:ty),*);)*) => {
         struct Functions {
@@ -206,13 +206,13 @@ pub(crate) struct Cuda {
     /// The contexts that all users of a device share (the primary ones), of the devices that were used. They stay, as
     /// those of CUDA's runtime do: making one takes a tenth of a second.
     contexts: Mutex<Vec<(CuDevice, Context)>>,
-    /// Keeps the functions where they are.
+    /// The loaded library; dropping it would invalidate the functions.
     _library: Library,
 }
 
 // SAFETY: the driver's functions may be called by any thread, and a context belongs to no thread.
 unsafe impl Send for Cuda {}
-// SAFETY: as above; the list is locked.
+// SAFETY: the driver's functions may be called by any thread; the list of contexts is behind a lock.
 unsafe impl Sync for Cuda {}
 
 impl Cuda {
@@ -240,23 +240,23 @@ impl Cuda {
             return Ok(*context);
         }
         let mut context = null_mut();
-        // SAFETY: a device of CUDA's, and a pointer to a context.
+        // SAFETY: a device that CUDA listed, and a pointer to a context.
         let code = unsafe { (self.functions.retain)(&raw mut context, device) };
         self.checked("cuDevicePrimaryCtxRetain", code)?;
         contexts.push((device, context));
         Ok(context)
     }
 
-    /// Keeps the name of the call that failed.
+    /// Converts a result code to an error with the name of the call.
     fn checked(&self, call: &'static str, code: c_int) -> Result<(), CudaError> {
         if code == 0 {
             return Ok(());
         }
         let mut name = std::ptr::null();
-        // SAFETY: the function sets the pointer to a string that stays, or leaves it null.
+        // SAFETY: the function sets the pointer to a static string, or leaves it null.
         let named = unsafe { (self.functions.error_name)(code, &raw mut name) } == 0;
         let name = match named && !name.is_null() {
-            // SAFETY: a string of the driver's that stays.
+            // SAFETY: the pointer is not null, and the driver's string is static.
             true => unsafe { CStr::from_ptr(name) }
                 .to_string_lossy()
                 .into_owned(),
@@ -271,16 +271,16 @@ impl Cuda {
         // SAFETY: plain arguments, and pointers to values of the declared types, here and below.
         self.checked("cuInit", unsafe { (functions.init)(0) })?;
         let mut count = 0;
-        // SAFETY: as above.
+        // SAFETY: plain arguments, and pointers to values of the declared types.
         let code = unsafe { (functions.device_count)(&raw mut count) };
         self.checked("cuDeviceGetCount", code)?;
         let mut seen = Vec::new();
         for ordinal in 0..count {
             let (mut device, mut uuid) = (0, [0; 16]);
-            // SAFETY: as above.
+            // SAFETY: plain arguments, and pointers to values of the declared types.
             let code = unsafe { (functions.device)(&raw mut device, ordinal) };
             self.checked("cuDeviceGet", code)?;
-            // SAFETY: as above, and a device that the driver has named.
+            // SAFETY: the device is one that the driver listed; the pointer is to a value of the declared type.
             let code = unsafe { (functions.device_uuid)(&raw mut uuid, device) };
             self.checked("cuDeviceGetUuid", code)?;
             let uuid = spelt(uuid);
@@ -297,7 +297,7 @@ impl Cuda {
     }
 }
 
-/// As RFC 9562 writes it.
+/// A UUID as text, in the form of RFC 9562.
 fn spelt(uuid: [u8; 16]) -> String {
     let digits: String = uuid.iter().map(|byte| format!("{byte:02x}")).collect();
     let parts = [0..8, 8..12, 12..16, 16..20, 20..32];
@@ -316,16 +316,16 @@ pub(crate) struct Mapping {
     address: Option<Address>,
     /// The semaphore, and the value that says that the result is written.
     semaphore: Option<(Semaphore, u64)>,
-    /// Whether the memory's address was handed out, so that work of others may still use it.
+    /// Whether the memory's address was exported. Work that other libraries have queued may then still use it.
     is_known: AtomicBool,
-    /// The process that it is of: CUDA cannot be used in one that was forked from it.
+    /// The process that imported the memory: a process forked from it cannot use CUDA.
     process: u32,
 }
 
 // SAFETY: the driver's functions may be called by any thread, and its handles belong to no thread; the context is
 // made a thread's for the length of a call.
 unsafe impl Send for Mapping {}
-// SAFETY: as above; nothing but atomic numbers changes behind a shared reference.
+// SAFETY: the driver's handles belong to no thread, and only atomic numbers change behind a shared reference.
 unsafe impl Sync for Mapping {}
 
 impl Mapping {
@@ -442,7 +442,7 @@ impl Mapping {
     /// others are pointers. The host does not wait.
     pub(crate) fn order(&self, stream: usize) -> Result<(), CudaError> {
         self.check_process()?;
-        self.result.is_written()?; // not, if the device was lost
+        self.result.is_written()?; // an error if the device was lost: nothing was written then
         let Some((semaphore, value)) = self.semaphore else {
             return Ok(());
         };
@@ -465,13 +465,13 @@ impl Mapping {
     pub(crate) fn copy_to_host(&self, start: usize, bytes: &mut [u8]) -> Result<(), CudaError> {
         self.check_process()?;
         self.result.wait()?;
-        self.order(DEFAULT_STREAM)?; // on which the copy is
+        self.order(DEFAULT_STREAM)?; // the copy runs on this stream, so it comes after the result
         let Some(address) = self.address else {
             return Ok(());
         };
         let size = bytes.len().min(self.result.bytes() as usize - start);
         in_context(self.cuda, self.context, || {
-            // SAFETY: both have at least so many bytes.
+            // SAFETY: source and destination have at least this number of bytes.
             let code = unsafe {
                 let copy = self.cuda.functions.copy_to_host;
                 copy(bytes.as_mut_ptr().cast(), address + start as Address, size)
@@ -480,25 +480,25 @@ impl Mapping {
         })
     }
 
-    /// Gives back what CUDA made, when nothing uses it any more.
+    /// Frees CUDA's objects, after all work that may use them.
     fn give_back(&mut self) -> Result<(), CudaError> {
         let (cuda, functions) = (self.cuda, &self.cuda.functions);
         if let Some(address) = self.address.take() {
             if *self.is_known.get_mut() {
                 // The library that imported it may have released it while its work was still queued.
-                // SAFETY: the context is the current one.
+                // SAFETY: the context of these objects is current.
                 cuda.checked("cuCtxSynchronize", unsafe { (functions.synchronize)() })?;
             }
-            // SAFETY: mapped by `import`, once, and nothing uses it.
+            // SAFETY: `import` mapped it once, and nothing uses it any more.
             cuda.checked("cuMemFree", unsafe { (functions.free)(address) })?;
         }
         if let Some((semaphore, _)) = self.semaphore.take() {
-            // SAFETY: imported by `import`, and nothing waits for it.
+            // SAFETY: `import` imported the semaphore, and nothing waits for it any more.
             let code = unsafe { (functions.destroy_semaphore)(semaphore) };
             cuda.checked("cuDestroyExternalSemaphore", code)?;
         }
         if let Some(memory) = self.memory.take() {
-            // SAFETY: imported by `import`, and nothing of it is mapped any more.
+            // SAFETY: `import` imported the memory, and no part of it is mapped any more.
             let code = unsafe { (functions.destroy_memory)(memory) };
             cuda.checked("cuDestroyExternalMemory", code)?;
         }
@@ -509,13 +509,13 @@ impl Mapping {
 /// The default stream that all threads share.
 pub(crate) const DEFAULT_STREAM: usize = 1;
 
-/// Does work while a context is the thread's current one.
+/// Runs work with a context as the thread's current context.
 fn in_context<T>(
     cuda: &Cuda,
     context: Context,
     work: impl FnOnce() -> Result<T, CudaError>,
 ) -> Result<T, CudaError> {
-    // SAFETY: a context that stays.
+    // SAFETY: primary contexts are kept until the process ends.
     cuda.checked("cuCtxPushCurrent", unsafe {
         (cuda.functions.push)(context)
     })?;
@@ -531,9 +531,9 @@ fn in_context<T>(
 impl Drop for Mapping {
     fn drop(&mut self) {
         if self.check_process().is_err() {
-            return; // the driver is not there
+            return; // there is no driver, so nothing was imported
         }
-        // After a lost device, streams would wait forever for its semaphore. So nothing is freed then.
+        // After a lost device, streams may wait forever for its semaphore. Freeing would wait with them, so nothing is freed.
         if self.result.wait().is_err() {
             return;
         }

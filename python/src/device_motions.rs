@@ -24,7 +24,7 @@ pub(crate) struct DeviceMotions {
     is_on_card: bool,
 }
 
-/// Why results do not stay on the card.
+/// The reason why results do not stay on the card.
 fn of_cuda(error: &CudaError) -> PyErr {
     device(&format!(
         "device: {error}; leave out `device`, and results are arrays of NumPy's"

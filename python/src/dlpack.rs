@@ -14,7 +14,7 @@ use tumble::ComponentType;
 
 use crate::array_memory::ArrayMemory;
 
-/// The version of the newer form.
+/// The DLPack version of capsules with a version.
 const VERSION: Version = Version { major: 1, minor: 0 };
 
 /// `DLDevice`.
@@ -73,7 +73,7 @@ struct TensorBuffers {
     _memory: Arc<ArrayMemory>,
 }
 
-/// `DLManagedTensor`, and behind it what is ours.
+/// `DLManagedTensor`, followed by our fields, which keep the memory alive.
 #[repr(C)]
 struct Managed {
     tensor: Tensor,
@@ -82,7 +82,7 @@ struct Managed {
     buffers: TensorBuffers,
 }
 
-/// `DLManagedTensorVersioned`, and behind it what is ours.
+/// `DLManagedTensorVersioned`, followed by our fields, which keep the memory alive.
 #[repr(C)]
 struct ManagedVersioned {
     version: Version,
@@ -105,7 +105,7 @@ const _: () = {
 /// The pointer is that of a box of this type, which is not used any more.
 unsafe extern "C" fn delete<T>(managed: *mut T) {
     if !managed.is_null() {
-        // SAFETY: promised by the caller.
+        // SAFETY: the caller promises that the pointer is to a box of this type.
         drop(unsafe { Box::from_raw(managed) });
     }
 }

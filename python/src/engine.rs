@@ -14,7 +14,7 @@ use crate::errors::{device, input};
 use crate::names::{option_named, unknown_value};
 use crate::run::interruptible;
 
-/// Fewer rotations than this the CPU evaluates before another device is open.
+/// Below this number of rotations, the CPU finishes before another device is open.
 pub(crate) const MIN_DEVICE_ROTATIONS: usize = 1 << 20;
 
 /// Evaluates clips on one device, which stays open.
@@ -39,9 +39,9 @@ pub(crate) const MIN_DEVICE_ROTATIONS: usize = 1 << 20;
 #[pyclass(frozen, weakref, module = "tumble")]
 pub(crate) struct Engine {
     engine: tumble::Engine,
-    /// For large calls, where the choice is by cost.
+    /// The device for large calls, if `device="auto"`.
     by_cost: Option<OnceLock<(u32, tumble::Engine)>>,
-    /// For copies in other processes.
+    /// The arguments, with which copies in other processes open their device.
     arguments: EngineArguments,
 }
 
@@ -89,7 +89,7 @@ fn sequence_named(name: &str) -> PyResult<EulerSequence> {
     sequence.map_err(|error| input(format!("sequence: {error}")))
 }
 
-/// The axes of that name, and whether they are the world's, along the skeleton.
+/// Parses the keyword `axes`: the axes, and whether the rates are relative to the world, all parents included.
 pub(crate) fn axes_named(name: &str) -> PyResult<(Axes, bool)> {
     if name == "world" {
         // The parent of a track without a parent is the world.
@@ -103,7 +103,7 @@ pub(crate) fn axes_named(name: &str) -> PyResult<(Axes, bool)> {
 }
 
 impl Engine {
-    /// The engine for a call of so many rotations.
+    /// The engine for a call with this number of rotations.
     pub(crate) fn engine_for(&self, rotations: usize) -> PyResult<tumble::Engine> {
         let Some(large) = self
             .by_cost
@@ -132,7 +132,7 @@ impl Engine {
     }
 }
 
-/// Why a device cannot be opened.
+/// The exception for a device that cannot be opened.
 fn of_host(failure: &host::Refused) -> PyErr {
     match failure.is_usage {
         true => input(&failure.message),

@@ -64,7 +64,8 @@ impl Class {
             let object = self.object(py, message, found);
             object.map_or_else(|error| error, PyErr::from_value)
         });
-        // If the interpreter has ended, no exception can be created; nobody reads the error of this work.
+        // At the interpreter's shutdown no exception object can be created. The error is dropped: no Python code runs
+        // any more that could catch it.
         made.unwrap_or_else(|| PyRuntimeError::new_err(message.to_owned()))
     }
 }
@@ -97,13 +98,13 @@ impl From<&Diagnostic> for FaultDetails {
     }
 }
 
-/// A refused argument.
+/// The exception for an invalid argument.
 pub(crate) fn input(message: impl AsRef<str>) -> PyErr {
     Class::Input.error(message.as_ref(), &FaultDetails::default())
 }
 
-/// A refused argument, with the program's code for the same fault in a file, and the position
-/// in the arrays.
+/// The exception for an invalid argument, with the code that the program uses for the same error in a file, and the
+/// position in the arrays.
 pub(crate) fn input_at(message: &str, code: Code, pointer: String) -> PyErr {
     let found = FaultDetails {
         code: Some(code.name()),
@@ -113,7 +114,7 @@ pub(crate) fn input_at(message: &str, code: Code, pointer: String) -> PyErr {
     Class::Input.error(message, &found)
 }
 
-/// A message of the program's with Python's keywords instead of options: `--map time=NAME` is
+/// Replaces the program's options in a message by Python's keywords: `--map time=NAME` becomes
 /// `map="time=NAME"`.
 pub(crate) fn in_python(message: &str) -> String {
     const WORDS: [(&str, &str); 13] = [
@@ -258,7 +259,7 @@ pub(crate) fn expected(py: Python<'_>, error: PyErr, message: impl FnOnce() -> S
     }
 }
 
-/// Whether an object has an attribute. Objects that refuse to say have none; Ctrl-C stays an error.
+/// Whether an object has an attribute. An exception of the object counts as no; Ctrl-C is passed on.
 pub(crate) fn has_attribute(of: &Bound<'_, PyAny>, name: &str) -> PyResult<bool> {
     match of.hasattr(name) {
         Err(error) if error.is_instance_of::<PyException>(of.py()) => Ok(false),
@@ -266,12 +267,12 @@ pub(crate) fn has_attribute(of: &Bound<'_, PyAny>, name: &str) -> PyResult<bool>
     }
 }
 
-/// Keys that were refused.
+/// The exception for invalid keys.
 pub(crate) fn of_track(error: &TrackError) -> PyErr {
     of_track_since(0, error)
 }
 
-/// As [`of_track`], of times that are counted from a second.
+/// Like [`of_track`], for times that are stored relative to a whole second (`time_offset`).
 pub(crate) fn of_track_since(second: i64, error: &TrackError) -> PyErr {
     let mut message = error.to_string();
     if second != 0 && matches!(error, TrackError::TimeNotIncreasing { .. }) {
@@ -309,7 +310,7 @@ pub(crate) fn of_track_since(second: i64, error: &TrackError) -> PyErr {
     }
 }
 
-/// An evaluation that failed.
+/// The exception for a failed evaluation.
 pub(crate) fn of_engine(error: &Error) -> PyErr {
     let message = error.to_string();
     match error {
@@ -340,12 +341,12 @@ pub(crate) fn of_engine(error: &Error) -> PyErr {
     }
 }
 
-/// A device that cannot be used.
+/// The exception for a device that cannot be used.
 pub(crate) fn device(message: &str) -> PyErr {
     Class::Device.error(message, &FaultDetails::default())
 }
 
-/// An output that cannot be written.
+/// The exception for an output that cannot be written.
 pub(crate) fn output(message: &str) -> PyErr {
     Class::Output.error(message, &FaultDetails::default())
 }

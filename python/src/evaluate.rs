@@ -33,20 +33,20 @@ pub(crate) struct OutputForm {
     pub(crate) layout: Layout,
     pub(crate) order: Order,
     pub(crate) as_rotation: bool,
-    /// The result stays on the card that makes it.
+    /// Whether the result stays in the memory of the card that computes it.
     pub(crate) on_card: bool,
-    /// Rates are those of the rotations in the world, along the skeleton, not those in the parents' frames.
+    /// Whether rates are relative to the world, with the motion of all parents, instead of relative to the parent.
     pub(crate) in_world: bool,
-    /// Angles in radians instead of degrees.
+    /// Whether angles are in radians instead of degrees.
     pub(crate) radians: bool,
-    /// Rotation vectors, three numbers, of quaternions.
+    /// Whether quaternions become rotation vectors, three numbers.
     pub(crate) as_vectors: bool,
-    /// The only track has no axis.
+    /// Whether the result has no axis of tracks, because there is a single track.
     pub(crate) is_one_track: bool,
 }
 
 impl OutputForm {
-    /// Velocities or accelerations, three numbers.
+    /// Whether values are velocities or accelerations, three numbers.
     pub(crate) fn of_rates(
         quantity: Quantity,
         in_world: bool,
@@ -89,12 +89,12 @@ struct Work<'a> {
     clip: &'a Motion,
     request: &'a EvaluationKeywords,
     frames: &'a SampleTimes,
-    /// Samples of a track.
+    /// The number of samples of a track.
     count: usize,
 }
 
 impl OutputForm {
-    /// Evaluates a clip into an array of NumPy's.
+    /// Evaluates a clip into a NumPy array.
     pub(crate) fn of<'py>(
         &self,
         py: Python<'py>,
@@ -228,7 +228,7 @@ impl OutputForm {
         Ok(array.into_any())
     }
 
-    /// Refuses forms of results that the host computes after the engine, or that need the host's memory.
+    /// Fails for results that the host computes after the engine, or that need memory of the host.
     fn check_on_card(
         &self,
         samples: &SampleChoice,
@@ -257,7 +257,7 @@ impl OutputForm {
         Err(input(format!("device_array: {refused}")))
     }
 
-    /// Evaluates a clip into memory of the device, which stays there.
+    /// Evaluates a clip into memory of the device, without a copy to the host.
     fn card_array<'py>(
         &self,
         py: Python<'py>,
@@ -319,7 +319,7 @@ impl OutputForm {
         Ok(())
     }
 
-    /// Makes rates in the parents' frames those in the world.
+    /// Converts rates relative to the parents to rates relative to the world.
     fn along_skeleton(&self, work: Work<'_>, numbers: &mut [f32]) -> PyResult<()> {
         let Work { clip, count, .. } = work;
         let tracks = clip.set.track_count();
@@ -339,7 +339,7 @@ impl OutputForm {
             _ => Vec::new(),
         };
         let order = parents_first(clip)?;
-        // A rotation in the world, and its velocity where accelerations are asked for.
+        // The world rotation of each track and, for accelerations, its angular velocity.
         let mut world = vec![(DQuat::IDENTITY, DVec3::ZERO); tracks];
         for sample in 0..count {
             if sample % 256 == 255 {
@@ -468,7 +468,7 @@ impl OutputForm {
         Ok(results.into_any())
     }
 
-    /// Rotations of `SciPy`'s: one object for one track, else a list of them.
+    /// SciPy's `Rotation` objects: one for a single track, otherwise a list with one for each track.
     fn rotation<'py>(
         &self,
         array: &Bound<'py, PyAny>,
@@ -542,7 +542,7 @@ fn parents_first(clip: &Motion) -> PyResult<Vec<usize>> {
 /// interpolated: the check takes as long as preparing them, and is done once.
 static CHECKED_CURVES: Mutex<VecDeque<(Weak<Motion>, Interpolation)>> = Mutex::new(VecDeque::new());
 
-/// How many checked clips are remembered.
+/// The number of checked clips that are remembered.
 const MAX_CHECKED_CURVES: usize = 256;
 
 /// Samples for which a track is prepared as a whole: fewer keys than so many times these.
@@ -592,7 +592,7 @@ fn clip_is_short(rotations: usize) -> bool {
     rotations < 4096
 }
 
-/// One track of a clip, with its channels.
+/// A clip with one track of another clip and its channels.
 fn track_of(clip: &Motion, track: usize) -> PyResult<Motion> {
     Ok(Motion {
         set: clip.set.select([track]).map_err(of_tracks)?,

@@ -24,7 +24,7 @@ fn array<T: Element>(
     Ok(PyArray1::from_vec(py, numbers).reshape(shape)?.into_any())
 }
 
-/// Numbers whose last axis has so many, and the axes before.
+/// The numbers of an array whose last axis has a fixed length, and the shape before that axis.
 fn rows<const N: usize>(
     value: &Bound<'_, PyAny>,
     name: &str,
@@ -135,7 +135,7 @@ pub(crate) fn heading<'py>(
     array(quaternions.py(), rotations.iter().map(of).collect(), shape)
 }
 
-/// The heading of a root by an axis of its body, or by its twist.
+/// How the heading of a root is measured: by an axis of its body, or by its twist.
 pub(crate) fn heading_source(axis: Option<&Bound<'_, PyAny>>) -> PyResult<HeadingSource> {
     let axes = [HeadingSource::X, HeadingSource::Y, HeadingSource::Z];
     let axis = axis.map(axis_of).transpose()?;
@@ -239,7 +239,7 @@ pub(crate) fn root_after_loops<'py>(
     PyTuple::new(py, all)
 }
 
-/// 0, 1 or 2 for x, y or z.
+/// The index of an axis: 0, 1 or 2 for "x", "y" or "z".
 fn axis_of(axis: &Bound<'_, PyAny>) -> PyResult<usize> {
     one_of(axis, "axis", &[("x", 0), ("y", 1), ("z", 2)])
 }
@@ -321,7 +321,7 @@ pub(crate) fn mirror_pairs(names: ListArgument<String>) -> Vec<usize> {
     learning::mirror_pairs(&names.0)
 }
 
-/// Where each row of the last but one axis comes from.
+/// Checks `pairs`: the index of the body from which each row of the second-last axis is copied.
 fn partners(pairs: Option<ListArgument<usize>>, shape: &[usize]) -> PyResult<Option<Vec<usize>>> {
     let Some(ListArgument(pairs)) = pairs else {
         return Ok(None);
@@ -336,7 +336,7 @@ fn partners(pairs: Option<ListArgument<usize>>, shape: &[usize]) -> PyResult<Opt
     }
 }
 
-/// Rows by their partners.
+/// Exchanges rows with their partners (`pairs`).
 fn exchanged<T: Copy>(rows: Vec<T>, pairs: Option<&[usize]>) -> Vec<T> {
     let Some(pairs) = pairs.filter(|pairs| !pairs.is_empty()) else {
         return rows;

@@ -41,14 +41,14 @@ pub(crate) struct File {
 }
 
 impl PartialEq for File {
-    /// Whether both have the same clips, and the same reasons why others could not be read, wherever they were read.
+    /// Whether both files have equal clips and equal errors of unreadable clips. Their paths may differ.
     fn eq(&self, other: &Self) -> bool {
         self.clips == other.clips && self.reasons().eq(other.reasons())
     }
 }
 
 impl File {
-    /// Why other clips could not be read, without the path that the messages begin with.
+    /// The errors of clips that could not be read, without the path at the beginning.
     fn reasons(&self) -> impl Iterator<Item = &str> {
         let path = self.path.display().to_string();
         let texts = self.refused.iter();
@@ -108,14 +108,14 @@ impl File {
         self.refused.clone()
     }
 
-    /// That of equal files is the same.
+    /// A hash; files that are equal (`==`) have the same.
     fn __hash__(&self) -> u64 {
         let mut hasher = DefaultHasher::new();
         (self.names(), self.refused.len()).hash(&mut hasher);
         hasher.finish()
     }
 
-    /// Its clips, each as it is pickled: see `Clip`.
+    /// Pickles the clips, each as a `Clip` is pickled.
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyTuple>> {
         let (py, file) = (slf.py(), slf.get());
         let again = py.import("tumble._tumble")?.getattr("file_of_state")?;
@@ -123,7 +123,7 @@ impl File {
         PyTuple::new(py, [again, state.into_pyobject(py)?.into_any()])
     }
 
-    /// Files do not change: the copy is the file.
+    /// Returns the file itself: files are immutable.
     fn __copy__(slf: Bound<'_, Self>) -> Bound<'_, Self> {
         slf
     }
@@ -271,7 +271,7 @@ pub(crate) fn load(
     Ok(file)
 }
 
-/// A file that was left out: its path, the code of the fault, and the message.
+/// A file that could not be read: its path, the code of the error, and the message.
 type SkippedFile = (PathBuf, Option<String>, String);
 
 /// Reads files of any format, as `load` does with the same keywords, on all threads, and warns once for each code: what
@@ -324,7 +324,7 @@ pub(crate) fn load_all(
     Ok((files, skipped))
 }
 
-/// Files that are read between two calls of `progress`.
+/// The number of files that are read between two calls of `progress`.
 const FILES_AT_ONCE: usize = 64;
 
 /// The keywords of `load`.
@@ -401,7 +401,7 @@ impl<'py> LoadKeywords<'py> {
     }
 }
 
-/// How a file is read.
+/// The options of reading a file.
 #[derive(Clone, Default)]
 struct FileOptions {
     format: Option<&'static Format>,
@@ -411,13 +411,13 @@ struct FileOptions {
     body_model: Option<PathBuf>,
     scale: Option<Scale>,
     up: Option<UpAxis>,
-    /// Other keys are read than the file says itself.
+    /// Whether options change the keys, so that they differ from those in the file.
     is_changed: bool,
     shape: ClipShape,
 }
 
 impl FileOptions {
-    /// As keywords say.
+    /// Reads the options from the keywords of `load`.
     fn new(keywords: LoadKeywords<'_>) -> PyResult<Self> {
         let LoadKeywords {
             format,
@@ -511,7 +511,7 @@ impl FileOptions {
         })
     }
 
-    /// Reads a file; returns what to warn of, too.
+    /// Reads a file; also returns the warnings about it.
     fn read(self, py: Python<'_>, path: PathBuf) -> PyResult<(File, Vec<Diagnostic>)> {
         let request = Arc::new(self);
         let (reading, file) = (Arc::clone(&request), path.clone());
@@ -666,11 +666,11 @@ fn joint_offsets(value: &Bound<'_, PyAny>) -> PyResult<JointOffsets> {
     }
 }
 
-/// By how much translations are multiplied.
+/// The factor for translations: the keyword `scale`.
 #[derive(Debug, Clone, Copy)]
 enum Scale {
     Factor(f64),
-    /// By as much as makes metres of the file's unit.
+    /// The factor that converts the file's unit to metres.
     Metres,
 }
 
@@ -689,7 +689,7 @@ impl Scale {
 }
 
 impl File {
-    /// `is_changed`: other keys were read than the file says itself.
+    /// `is_changed`: options changed the keys, so that they differ from those in the file.
     fn new(path: PathBuf, loaded: &mut Loaded, is_changed: bool) -> Self {
         let source = Arc::new(Source {
             path: path.clone(),
@@ -712,7 +712,7 @@ impl File {
     }
 }
 
-/// The file of these clips.
+/// Makes the `File` of these clips.
 #[pyfunction]
 pub(crate) fn file_of_state(path: PathBuf, clips: Vec<Clip>, refused: Vec<String>) -> File {
     File {
@@ -722,7 +722,7 @@ pub(crate) fn file_of_state(path: PathBuf, clips: Vec<Clip>, refused: Vec<String
     }
 }
 
-/// The format of that name.
+/// The format with this name.
 pub(crate) fn format_named(name: &str) -> PyResult<&'static Format> {
     Format::named(name).ok_or_else(|| {
         let names: Vec<&str> = tumble_formats::FORMATS.iter().map(|it| it.name).collect();

@@ -112,8 +112,8 @@ impl FollowOptions<'_, '_> {
     }
 }
 
-/// The points of each path: (points, 3), (tracks, points, 3), or a list with an array for each track; and
-/// whether it is one alone.
+/// The points of each path, from an array (points, 3) or (tracks, points, 3) or a list with an array for each track; and
+/// whether there is a single path, so that the result has no axis of tracks.
 fn points(value: &Bound<'_, PyAny>, name: &str) -> PyResult<(Vec<Vec<DVec3>>, bool)> {
     let vectors = |values: &[f64]| -> Vec<DVec3> {
         let all = values.as_chunks::<3>().0.iter();
@@ -147,7 +147,7 @@ fn points(value: &Bound<'_, PyAny>, name: &str) -> PyResult<(Vec<Vec<DVec3>>, bo
     }
 }
 
-/// Times in seconds: one list for all paths or one for each.
+/// The times of the points [s], from one list for all paths or one for each path.
 fn times(value: &Bound<'_, PyAny>, tracks: usize) -> PyResult<Vec<Vec<f64>>> {
     let lists: Vec<Vec<f64>> = match parts(value)? {
         Some(parts) => {
@@ -177,7 +177,7 @@ fn times(value: &Bound<'_, PyAny>, tracks: usize) -> PyResult<Vec<Vec<f64>>> {
     }
 }
 
-/// Positions and rotations of the bodies on paths.
+/// Evaluates paths: the positions and rotations of their bodies at the samples.
 pub(crate) fn follow<'py>(
     engine: &Engine,
     (key_times, path): (Option<&Bound<'py, PyAny>>, &Bound<'py, PyAny>),

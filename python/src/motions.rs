@@ -33,19 +33,19 @@ use crate::output::filled;
 use crate::run::stoppable;
 use crate::samples::{joint_offsets, joint_parents};
 
-/// A whole number of ticks is a frame of all usual rates.
+/// Ticks per second: a frame of each usual rate is a whole number of ticks.
 const TICKS: u32 = 705_600;
 
-/// At most as many times these ticks are a second's: then times are kept to 30 ns.
+/// The largest factor on the ticks per second, for rates that need finer ticks: times are then rounded to 30 ns.
 const FINEST: f64 = 24.0;
 
 /// The longest clip, ticks.
 const LONGEST: f64 = 2.1e9;
 
-/// Clips whose joints are put in order at once: these may be copies.
+/// The number of clips that are reordered together; reordered clips are copies, which take memory.
 const CLIPS_AT_ONCE: usize = 1024;
 
-/// Joints of a call from which on Ctrl-C is looked for.
+/// Calls with at least this many joints run in a thread that Ctrl-C can stop; smaller ones end sooner than that.
 pub(crate) const MANY: usize = 1 << 21;
 
 /// The clips of a motion library, prepared: what is sampled, and its arrays for files.
@@ -54,32 +54,32 @@ pub(crate) struct Motions {
     tables: MotionTables,
     spans: Py<PyArray2<u32>>,
     cells: Py<PyArray2<f32>>,
-    /// Why a clip has no positions, empty for the others; no entries if all have some.
+    /// For each clip, the reason why it has no positions; empty if it has. No entries if all clips have positions.
     #[pyo3(get)]
     unplaced: Vec<String>,
     /// The names of the joints; no entries in files that do not store them.
     #[pyo3(get)]
     joint_names: Vec<String>,
-    /// The clips that do not fit and were left out: their indices in the list, and why.
+    /// The clips that were left out because they do not fit: their indices in the list, and the reasons.
     #[pyo3(get)]
     skipped: Vec<SkippedClip>,
 }
 
-/// The index of a clip in a list, and why it was left out.
+/// The index of a clip in a list, and the reason why it was left out.
 type SkippedClip = (usize, String);
 
 /// The skeleton that the caller chose for all clips of a library or a crowd.
 pub(crate) enum ChosenSkeleton {
-    /// That of the first clip.
+    /// The skeleton of the first clip.
     First,
-    /// That of another clip.
+    /// The skeleton of another clip.
     Clip(Clip),
     /// Arrays, in the order of the tracks of the first clip; without offsets, each clip keeps its own.
     Arrays(Vec<Option<usize>>, Option<Vec<Vec3>>),
 }
 
 impl ChosenSkeleton {
-    /// That of arrays, for so many tracks.
+    /// The skeleton in arrays, checked for the number of tracks.
     pub(crate) fn of_arrays(
         parents: &[Option<i64>],
         offsets: Option<&Bound<'_, PyAny>>,
@@ -99,14 +99,14 @@ pub(crate) struct ListedClip<'a> {
 }
 
 impl ListedClip<'_> {
-    /// All clips of a list.
+    /// Reads the clips of a Python list.
     pub(crate) fn all(clips: &[Clip]) -> impl Iterator<Item = ListedClip<'_>> {
         let listed = clips.iter().enumerate();
         listed.map(|(index, clip)| ListedClip { index, clip })
     }
 }
 
-/// The clip's name in messages: the path of its file, else its place in the list.
+/// The clip's name in messages: the path of its file or, without a file, its index in the list.
 impl fmt::Display for ListedClip<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match &self.clip.source {
@@ -120,7 +120,7 @@ impl fmt::Display for ListedClip<'_> {
 pub(crate) struct SharedSkeleton {
     skeleton: ClipSkeleton,
     offsets: OffsetSource,
-    /// The file whose clips need not have all joints: it says where the others rest.
+    /// The file of the skeleton. Its clips need not have all joints, because the file has the rest poses of the others.
     file: Option<Arc<Source>>,
 }
 
@@ -171,7 +171,7 @@ impl SharedSkeleton {
         Ok(Some(shared))
     }
 
-    /// Whether a clip is of the file of the skeleton, and read in the same way.
+    /// Whether a clip comes from the file of the skeleton, and was read with the same options.
     fn is_of_file(&self, clip: &Clip) -> bool {
         let (Some(file), Some(source)) = (&self.file, &clip.source) else {
             return false;
@@ -181,7 +181,7 @@ impl SharedSkeleton {
         is_same && !clip.motion.skeleton.is_empty()
     }
 
-    /// The skeleton of a library of the engine.
+    /// The skeleton in the form that the engine's library takes.
     pub(crate) fn of_engine(&self) -> PyResult<Skeleton> {
         let joints = self.skeleton.joints().iter();
         let parents = joints.clone().map(|joint| joint.parent).collect();
@@ -208,7 +208,7 @@ impl SharedSkeleton {
         fitted.map_err(|error| input(in_python(&error.to_string())))
     }
 
-    /// Why the positions of a clip's joints are unknown; `None` if they are known.
+    /// The reason why the positions of a clip's joints are unknown; `None` if they are known.
     pub(crate) fn unplaced(&self, listed: ListedClip<'_>) -> Option<String> {
         if self.offsets == OffsetSource::Skeleton {
             return None;
@@ -234,7 +234,7 @@ impl SharedSkeleton {
     }
 }
 
-/// The warning that joints of one name are matched by their order, where clips of several files are.
+/// Warns that joints with equal names are matched by their order, if the clips come from several files.
 pub(crate) fn order_assumption(clips: &[Clip]) -> Option<String> {
     let file = |clip: &Clip| clip.source.as_ref().map(|source| source.path.clone());
     let (first, others) = clips.split_first()?;
@@ -290,7 +290,7 @@ fn motion_clip<'a>(
     })
 }
 
-/// Those of the clips that fit a library, and the indices of the others with the reasons.
+/// Splits clips into those that fit a library, and the indices of the others with the reasons.
 fn fitting(
     skeleton: &SharedSkeleton,
     clips: Vec<Clip>,
@@ -318,7 +318,7 @@ fn fitting(
     }
 }
 
-/// The error of a clip that a library does not take.
+/// The exception for a clip that does not fit the library.
 pub(crate) fn of_pushed(error: CrowdError, listed: ListedClip<'_>) -> PyErr {
     match error {
         CrowdError::Stopped(_) => of_crowd(error),
@@ -583,7 +583,7 @@ impl Motions {
 }
 
 impl Motions {
-    /// Those of tables, all of whose clips have positions.
+    /// The library of tables, all of whose clips have positions.
     fn of_parts(
         py: Python<'_>,
         (tables, spans, cells): BuiltTables,
@@ -599,7 +599,7 @@ impl Motions {
         })
     }
 
-    /// Does work with the tables, without the interpreter's lock.
+    /// Runs work on the tables without the interpreter's lock.
     pub(crate) fn with_parts<T: Send>(
         &self,
         py: Python<'_>,
@@ -612,7 +612,7 @@ impl Motions {
         py.detach(|| work(&self.tables, (spans, cells)))
     }
 
-    /// Refuses positions of clips whose joints have none.
+    /// Fails if positions are requested of a clip whose joints have none.
     pub(crate) fn check_placed(&self, at: &[(u32, u32)]) -> PyResult<()> {
         let reasons = at.iter().map(|&(clip, _)| self.unplaced.get(clip as usize));
         match reasons.flatten().find(|reason| !reason.is_empty()) {
@@ -706,7 +706,7 @@ pub(crate) fn represent(
     })
 }
 
-/// The memory of an output as rows, as many as there are joints.
+/// The memory of an output as rows, one for each joint.
 fn rows<'a, const N: usize>(
     of: &'a mut Option<PyReadwriteArrayDyn<'_, f32>>,
     joints: usize,
@@ -772,7 +772,7 @@ fn length(motion: &Motion) -> f64 {
         .map_or(0.0, |(first, last)| last - first)
 }
 
-/// Refuses scales, which positions along the skeleton would leave out without a word.
+/// Fails if a clip has scales, because positions along the skeleton would silently ignore them.
 fn check(set: &tumble::TrackSet) -> Result<(), &'static str> {
     let has_scales = |track| set.vector_keys(Channel::Scale, track).is_some();
     match (0..set.track_count()).any(has_scales) {

@@ -20,7 +20,7 @@ pub(crate) fn unknown_name(refusal: &str, name: &str, known: &[&str]) -> String 
     format!("{refusal}; there are {list}{}", hint.unwrap_or_default())
 }
 
-/// As [`unknown_name`], for the value of a keyword.
+/// Like [`unknown_name`], for the value of a keyword.
 pub(crate) fn unknown_value(keyword: &str, name: &str, known: &[&str]) -> PyErr {
     let refusal = format!("{keyword}: there is no `{name}`");
     input(unknown_name(&refusal, name, known))
@@ -35,7 +35,7 @@ pub(crate) fn option_named<T: FromStr<Err = UnknownNameError>>(
         .map_err(|error: UnknownNameError| unknown_value(keyword, name, &error.known))
 }
 
-/// As [`option_named`], of a value of Python.
+/// Like [`option_named`], for a Python object.
 pub(crate) fn option_of<T: FromStr<Err = UnknownNameError>>(
     value: &Bound<'_, PyAny>,
     keyword: &str,
@@ -43,7 +43,7 @@ pub(crate) fn option_of<T: FromStr<Err = UnknownNameError>>(
     option_named(&text(value, keyword)?, keyword)
 }
 
-/// The value of that name.
+/// The value with this name.
 pub(crate) fn one_of<T: Copy>(
     value: &Bound<'_, PyAny>,
     keyword: &str,

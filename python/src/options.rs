@@ -19,7 +19,7 @@ use crate::arrays::{self, ArrayValues, doubles, parts};
 use crate::errors::{input, of_engine};
 use crate::names::{option_of, text, unknown_name, unknown_value};
 
-/// Which samples.
+/// The samples that are evaluated.
 #[derive(Debug, Clone)]
 pub(crate) enum SampleChoice {
     /// Frames at a rate.
@@ -27,9 +27,9 @@ pub(crate) enum SampleChoice {
     /// One list of times for all tracks; a single time stands for a result without an axis of
     /// frames.
     Shared { times: Arc<[f64]>, is_one: bool },
-    /// A list of times for each track, of one length.
+    /// A list of times for each track, all of the same length.
     Each { times: Arc<[f64]>, count: usize },
-    /// A list of times for each track.
+    /// A list of times for each track, of different lengths.
     Ragged(Vec<Vec<f64>>),
 }
 
@@ -97,7 +97,7 @@ impl EvaluationKeywords {
         Ok(request)
     }
 
-    /// The samples, of which there must be some.
+    /// The samples; an error if there are none.
     pub(crate) fn samples(&self) -> PyResult<&SampleChoice> {
         self.samples.as_ref().ok_or_else(none_asked_for)
     }
@@ -107,7 +107,7 @@ impl EvaluationKeywords {
         self.outside
     }
 
-    /// As [`SampleChoice::frames`], without the times that are left out.
+    /// Like [`SampleChoice::frames`], without the times that `before` and `after` leave out.
     pub(crate) fn frames(&self, clip: &Motion, tracks: Option<&[usize]>) -> PyResult<SampleTimes> {
         let samples = self.samples()?;
         let rate = match samples {
@@ -207,7 +207,7 @@ fn count_of(frames: SampleTimes, clip: &Motion) -> PyResult<(SampleTimes, usize)
     Ok((frames, timeline.len()))
 }
 
-/// Which samples some keywords mean, of which there must be some.
+/// The samples that the keywords select; an error if there are none.
 pub(crate) fn samples_of(
     fps: Option<&Bound<'_, PyAny>>,
     at: Option<Bound<'_, PyAny>>,
@@ -249,7 +249,7 @@ fn samples(
     }
 }
 
-/// The times of `at`.
+/// Reads the times of the keyword `at` [s].
 pub(crate) fn sample_times(value: &Bound<'_, PyAny>) -> PyResult<SampleChoice> {
     if let Some(parts) = parts(value)? {
         let mut lists = Vec::with_capacity(parts.len());
@@ -287,7 +287,7 @@ pub(crate) fn sample_times(value: &Bound<'_, PyAny>) -> PyResult<SampleChoice> {
     }
 }
 
-/// `60`, `29.97`, `"30000/1001"`, `Fraction(30000, 1001)`: each exactly what it says.
+/// Reads a rate: `60`, `29.97`, `"30000/1001"` or `Fraction(30000, 1001)`, each taken exactly.
 pub(crate) fn frame_rate(value: &Bound<'_, PyAny>) -> PyResult<FrameRate> {
     let text = value.str()?;
     text.to_str()?
@@ -295,7 +295,7 @@ pub(crate) fn frame_rate(value: &Bound<'_, PyAny>) -> PyResult<FrameRate> {
         .map_err(|error: tumble::SampleTimesError| input(format!("fps: {error}")))
 }
 
-/// The method of that name, or "authored".
+/// The method with this name; "authored" is one.
 pub(crate) fn method_named(name: &str) -> PyResult<MethodChoice> {
     name.parse().map_err(|error: UnknownNameError| {
         let refusal = format!("there is no method `{name}`");

@@ -13,7 +13,7 @@ use crate::arrays::{is_aligned, numpy};
 use crate::errors::input;
 use crate::names::unknown_value;
 
-/// The type of NumPy's that a component is stored as.
+/// The NumPy type in which a component is stored.
 pub(crate) fn type_name(component: ComponentType) -> &'static str {
     match component {
         ComponentType::F32 => "float32",
@@ -22,7 +22,7 @@ pub(crate) fn type_name(component: ComponentType) -> &'static str {
     }
 }
 
-/// The representation of rotations for a type of NumPy's.
+/// The representation of rotations that a NumPy type stands for (`dtype="float16"`).
 pub(crate) fn quaternions_of(dtype: &Bound<'_, PyAny>) -> PyResult<Encoding> {
     let kind = PyArrayDescr::new(dtype.py(), dtype.clone())?;
     let name = kind.str()?.to_string();
@@ -35,7 +35,7 @@ pub(crate) fn quaternions_of(dtype: &Bound<'_, PyAny>) -> PyResult<Encoding> {
     })
 }
 
-/// The representation of rotations of that name, with its options.
+/// The representation of rotations with this name and these options.
 pub(crate) fn encoding_named(name: &str, options: EncodingOptions) -> PyResult<Encoding> {
     let found = rotation_encodings().find(|encoding| encoding.name() == name);
     found.map(|encoding| encoding.with(options)).ok_or_else(|| {
@@ -44,7 +44,7 @@ pub(crate) fn encoding_named(name: &str, options: EncodingOptions) -> PyResult<E
     })
 }
 
-/// The representations of rotations, with the first of their options.
+/// All representations of rotations, each with its default options.
 pub(crate) fn rotation_encodings() -> impl Iterator<Item = Encoding> {
     Encoding::kinds().filter(|encoding| encoding.stores_rotations())
 }
@@ -61,7 +61,7 @@ pub(crate) fn array<'py>(
     Ok(array.cast_into()?)
 }
 
-/// As [`array`], of any type of components.
+/// Like [`array`], for any type of components.
 pub(crate) fn array_of<'py>(
     py: Python<'py>,
     component: ComponentType,
@@ -111,7 +111,7 @@ pub(crate) fn array_of<'py>(
     for &other in inputs {
         let shares = numpy(py)?.call_method1(intern!(py, "shares_memory"), (out, other));
         let shares = match shares {
-            // Only arrays can share memory.
+            // Only arrays can overlap `out` in memory; other inputs were copied.
             Err(error) if error.is_instance_of::<PyException>(py) => false,
             shares => shares?.is_truthy()?,
         };
@@ -124,7 +124,7 @@ pub(crate) fn array_of<'py>(
     Ok(out.clone())
 }
 
-/// Where the numbers of an array start.
+/// The address of the first number of an array.
 fn address(array: &Bound<'_, PyAny>) -> PyResult<usize> {
     if let Ok(array) = array.cast::<PyArrayDyn<f32>>() {
         return Ok(array.data() as usize);
@@ -146,7 +146,7 @@ fn fresh<'py>(py: Python<'py>, shape: &[usize]) -> PyResult<Bound<'py, PyArrayDy
     Ok(made.cast_into()?)
 }
 
-/// `(3, 61, 4)`, as Python writes it.
+/// A shape as Python prints it: `(3, 61, 4)`.
 pub(crate) fn shown(shape: &[usize]) -> String {
     match shape {
         [one] => format!("({one},)"),
@@ -157,7 +157,7 @@ pub(crate) fn shown(shape: &[usize]) -> String {
     }
 }
 
-/// Hands the memory of an array to `work`, which runs without the interpreter's lock.
+/// Runs `work`, which fills the memory of an array, without the interpreter's lock.
 pub(crate) fn filled(
     array: &Bound<'_, PyArrayDyn<f32>>,
     work: impl FnOnce(&mut [f32]) -> PyResult<()> + Send,
@@ -174,7 +174,7 @@ fn refused(error: numpy::BorrowError) -> PyErr {
     }
 }
 
-/// As [`filled`], for an array of any type of components.
+/// Like [`filled`], for an array of any type of components.
 pub(crate) fn filled_bytes(
     array: &Bound<'_, PyAny>,
     work: impl FnOnce(&mut [u8]) -> PyResult<()> + Send,

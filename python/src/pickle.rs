@@ -17,10 +17,10 @@ use crate::clip::{Clip, Source};
 use crate::errors::{guarded, input, of_track};
 use crate::values::{chunks, list, rows};
 
-/// The kinds of vectors, as they are numbered in a pickle.
+/// The kinds of vector keys; a pickle contains their indices.
 const VECTORS: [Channel; 2] = [Channel::Translation, Channel::Scale];
 
-/// The samplers, as they are numbered in a pickle, from 1; 0 is none.
+/// The interpolations of channels; a pickle contains their index plus 1, or 0 for none.
 const SAMPLERS: [ChannelInterpolation; 3] = [
     ChannelInterpolation::Step,
     ChannelInterpolation::Linear,
@@ -170,7 +170,7 @@ pub(crate) fn state<'py>(py: Python<'py>, clip: &Clip) -> PyResult<Bound<'py, Py
     Ok(state)
 }
 
-/// The entry of a state, which another version of the package may have left out.
+/// An entry of a state; the error if it is missing, as in a state of another version.
 fn entry<'py>(state: &Bound<'py, PyDict>, name: &str) -> PyResult<Bound<'py, PyAny>> {
     state.get_item(name)?.ok_or_else(|| {
         input(format!(
@@ -179,7 +179,7 @@ fn entry<'py>(state: &Bound<'py, PyDict>, name: &str) -> PyResult<Bound<'py, PyA
     })
 }
 
-/// The clip of a state.
+/// Restores a clip from its state.
 #[pyfunction]
 pub(crate) fn clip_of_state(state: &Bound<'_, PyDict>) -> PyResult<Clip> {
     guarded(|| {
@@ -367,13 +367,12 @@ fn motion_of(state: &Bound<'_, PyDict>) -> PyResult<Motion> {
             pelvis: Vec3::from_array(pelvis),
             shape,
         }),
-        // Only used when a file is read, to check the orders.
+        // Not pickled: it is only used while a file is read, to check the orders.
         robot: None,
     })
 }
 
-/// Whether two clips have the same tracks, keys, names and all else that is said of them, whatever files
-/// they come from.
+/// Whether two clips are equal in all their data: tracks, keys, names and all other properties. Their files may differ.
 pub(crate) fn is_same(a: &Motion, b: &Motion) -> bool {
     let tracks = a.set.track_count();
     let is_same_track = |track: usize| {

@@ -114,7 +114,7 @@ fn samples(
     Ok((samples, tracks))
 }
 
-/// The coordinates of positions: f64 where any track has an origin, and f32 where they are f32.
+/// The coordinates of positions: f64 if any track has an origin, otherwise f32.
 enum Positions {
     Single(Vec<f32>),
     Double(Vec<f64>),
@@ -145,8 +145,8 @@ impl Positions {
     }
 }
 
-/// Sampled numbers as an array, without a copy; `[sample][track]` is shown as `[track][sample]` if
-/// that is the layout.
+/// Sampled numbers as an array, without a copy. If the layout is by tracks, `[sample][track]` becomes a transposed view
+/// `[track][sample]`.
 fn shaped<'py, T: Element>(
     py: Python<'py>,
     numbers: Vec<T>,

@@ -81,7 +81,7 @@ impl Reduction {
         (angle.to_degrees(), distance)
     }
 
-    /// By its fields.
+    /// Pickles the fields.
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Pickled<'py>> {
         pickled(slf)
     }

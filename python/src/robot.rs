@@ -254,7 +254,7 @@ impl Robot {
     }
 }
 
-/// Numbers for each configuration.
+/// Numbers for each configuration (pose) of the robot.
 struct JointArray {
     /// The shape of the configurations.
     shape: Vec<usize>,
@@ -263,7 +263,7 @@ struct JointArray {
 }
 
 impl JointArray {
-    /// `each`: the last axes. `expected`: the axes before, where they are known.
+    /// Reads an array. `each`: the shape of the last axes. `expected`: the shape of the axes before, if it is known.
     fn new(
         value: &Bound<'_, PyAny>,
         name: &str,
@@ -451,7 +451,7 @@ fn of_bodies(error: &BodiesError) -> PyErr {
     }
 }
 
-/// The keywords of `Engine.bodies` that say what the arrays are.
+/// The keywords of `Engine.bodies` that describe its arrays: names and orders of joints and bodies.
 pub(crate) struct JointKeys<'a, 'py> {
     pub(crate) joint_pos: &'a Bound<'py, PyAny>,
     pub(crate) root_pos: Option<&'a Bound<'py, PyAny>>,

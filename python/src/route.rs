@@ -45,7 +45,7 @@ enum Shape {
     Net(Arc<ControlNet>),
 }
 
-/// A net and what it was made of.
+/// A net of control points, with the array from which it was made.
 struct ControlNet {
     net: Net,
     rows: usize,
@@ -300,7 +300,7 @@ impl RouteOptions {
     }
 }
 
-/// Pairs that are looked after together; between them Ctrl-C ends the work.
+/// The number of pairs that are computed together. Ctrl-C can end the work after each of these groups.
 const TOGETHER: usize = 8;
 
 fn in_pieces(
@@ -528,7 +528,7 @@ impl Surface {
         Ok(routes)
     }
 
-    /// That of surfaces that are the same is the same.
+    /// A hash; surfaces that are equal (`==`) have the same.
     fn __hash__(&self) -> u64 {
         let mut hasher = DefaultHasher::new();
         let size = match &self.shape {
@@ -539,7 +539,7 @@ impl Surface {
         hasher.finish()
     }
 
-    /// By its fields.
+    /// Pickles the fields.
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Pickled<'py>> {
         pickled(slf)
     }
@@ -586,7 +586,7 @@ impl Route {
         (start, goal)
     }
 
-    /// By its fields.
+    /// Pickles the fields.
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Pickled<'py>> {
         pickled(slf)
     }
@@ -621,7 +621,7 @@ impl Walk {
         normals.map(|normals| array(py, normals)).transpose()
     }
 
-    /// By its fields.
+    /// Pickles the fields.
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Pickled<'py>> {
         pickled(slf)
     }

@@ -13,17 +13,17 @@ use tumble::{
 
 use crate::errors::{guarded, of_engine};
 
-/// Work that takes one thread less than this, nanoseconds, is done at once: starting a thread would take
-/// longer than many a call.
+/// Work that takes one thread less than this [ns] is done on the calling thread, because starting a thread would take
+/// longer than many such calls.
 const SHORT: f64 = 3e7;
 
 /// The time that preparing a key for constant speed takes, nanoseconds.
 const CONSTANT_SPEED: f64 = 3e6;
 
-/// How long Ctrl-C may go unseen.
+/// The interval in which Ctrl-C is checked.
 const PATIENCE: Duration = Duration::from_millis(20);
 
-/// How long work that was stopped may take to end before it is left alone.
+/// The time that stopped work may take to end; after that, it is no longer waited for.
 const GRACE: Duration = Duration::from_millis(40);
 
 /// A set to evaluate, with the engine, the times and the form of the result.
@@ -33,7 +33,7 @@ pub(crate) struct Job<'a> {
     pub(crate) set: &'a TrackSet,
     pub(crate) interpolations: &'a PerTrack<Interpolation>,
     pub(crate) frames: &'a SampleTimes,
-    /// Samples of each track.
+    /// The number of samples of each track.
     pub(crate) samples: usize,
     pub(crate) layout: Layout,
     pub(crate) encoding: Encoding,
@@ -61,7 +61,7 @@ fn wait<T>(receiver: &Receiver<PyResult<T>>, stop: &Stop) -> PyResult<T> {
             Err(RecvTimeoutError::Timeout) => {
                 if let Err(interrupted) = check_signals() {
                     stop.stop();
-                    let _ = receiver.recv_timeout(GRACE); // the result is not needed
+                    let _ = receiver.recv_timeout(GRACE); // the result is dropped: Ctrl-C ended the wait
                     return Err(interrupted);
                 }
             }
@@ -103,10 +103,10 @@ pub(crate) fn stoppable<T: Send>(work: impl FnOnce() -> PyResult<T> + Send) -> P
     })
 }
 
-/// Values from which on work on arrays is worth a thread that Ctrl-C can stop.
+/// From this number of values, work on arrays runs in a thread, so that Ctrl-C can stop it.
 const MANY: usize = 1 << 16;
 
-/// Does work on so many values without the GIL; where these are many, Ctrl-C ends it.
+/// Runs work on this number of values without the GIL; if they are many, Ctrl-C ends it.
 pub(crate) fn work<T: Send + 'static>(
     py: Python<'_>,
     values: usize,
@@ -119,7 +119,7 @@ pub(crate) fn work<T: Send + 'static>(
 }
 
 impl Job<'_> {
-    /// Writes all of it to `output`.
+    /// Evaluates the request into `output`.
     pub(crate) fn write(&self, output: &mut [u8]) -> PyResult<()> {
         match self.nanoseconds() < SHORT {
             true => self.evaluate(output),
@@ -137,7 +137,7 @@ impl Job<'_> {
         evaluated.map_err(|error| of_engine(&error))
     }
 
-    /// Evaluates all of it into memory of the engine's device, where it stays.
+    /// Evaluates the request into memory of the engine's device, without a copy to the host.
     pub(crate) fn export(&self) -> PyResult<ExportedResult> {
         match self.nanoseconds() < SHORT {
             true => self.exported(),
@@ -156,7 +156,7 @@ impl Job<'_> {
         exported.map_err(|error| of_engine(&error))
     }
 
-    /// Some tracks.
+    /// Evaluates some of the tracks into `output`.
     pub(crate) fn tracks(&self, tracks: std::ops::Range<usize>, output: &mut [u8]) -> PyResult<()> {
         self.engine
             .request(self.set, self.interpolations.clone(), self.frames)
@@ -166,7 +166,7 @@ impl Job<'_> {
             .map_err(|error| of_engine(&error))
     }
 
-    /// About what it costs one thread at the most.
+    /// An upper estimate of the time on one thread [ns].
     fn nanoseconds(&self) -> f64 {
         let of_key = |interpolation: &Interpolation| match interpolation.speed {
             Speed::Constant => CONSTANT_SPEED,

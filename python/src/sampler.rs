@@ -36,7 +36,7 @@ pub(crate) struct Sampler {
 }
 
 impl Sampler {
-    /// A sampler of a clip by some keywords of an evaluation.
+    /// Makes a sampler of a clip from the keywords of `Clip.sampler`.
     pub(crate) fn of(
         clip: &Bound<'_, Clip>,
         options: Option<&Bound<'_, PyDict>>,
@@ -68,12 +68,12 @@ impl Sampler {
         Ok(Self { clip, sampler })
     }
 
-    /// The sampler, also after an error: its cursors are right or found again.
+    /// Locks the sampler, also after a panic in another thread: its cursors are only hints, which are checked.
     fn locked(&self) -> MutexGuard<'_, tumble::Sampler> {
         self.sampler.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// A time of the clip, or of its file's clock.
+    /// Converts a time of the clip, or of its file's clock, to the clip's time [s].
     fn time(&self, time: &Bound<'_, PyAny>) -> PyResult<f64> {
         let time = number(time, "time", "seconds")?;
         Ok(self.clip.motion.time_in_set(time))

@@ -1,4 +1,4 @@
-//! Arrays of samples to others: smoothed, blended, mixed, added, and walked down a skeleton.
+//! Functions from arrays of samples to arrays: smoothing, blending, mixing, adding, and poses along a skeleton.
 
 use std::sync::Arc;
 
@@ -23,7 +23,7 @@ use crate::options::frame_rate;
 use crate::output::{array, filled};
 use crate::run::{interruptible, work};
 
-/// The lengths of the axes of samples, without that of their components.
+/// The shape of samples without the last axis, that of the components.
 #[derive(Debug, Clone, Copy)]
 struct Axes {
     tracks: usize,
@@ -31,7 +31,7 @@ struct Axes {
 }
 
 impl Axes {
-    /// The axes of the shape (samples,) or, in that layout, (tracks, samples).
+    /// Reads the axes from the shape (samples,), or (tracks, samples) in this layout.
     fn of(shape: &[usize], layout: Layout, name: &str) -> PyResult<Self> {
         Ok(match (shape, layout) {
             (&[], _) => Self {
@@ -52,7 +52,7 @@ impl Axes {
     }
 }
 
-/// Values that are no samples.
+/// The exception for an array that has not the shape of samples.
 fn of_samples(name: &str, error: &SamplesError) -> PyErr {
     match error {
         SamplesError::OutOfRange { index, .. } => input_at(
@@ -68,13 +68,13 @@ fn rotations(values: &[Quat], tracks: usize, layout: Layout, name: &str) -> PyRe
     Rotations::of(values, tracks, layout).map_err(|error| of_samples(name, &error))
 }
 
-/// Rotations of any shape, as one track.
+/// Rotations (…, 4) of any shape, as one track.
 fn row(value: &Bound<'_, PyAny>, order: Order, name: &str) -> PyResult<(Vec<usize>, Rotations)> {
     let ArrayValues { shape, values } = quaternions(value, order, name)?;
     Ok((shape, rotations(&values, 1, Layout::TrackMajor, name)?))
 }
 
-/// The result as an array of that shape, with the components behind it.
+/// The result as an array: this shape, and the components as the last axis.
 fn written<'py>(
     py: Python<'py>,
     shape: &[usize],
@@ -94,7 +94,7 @@ fn written<'py>(
     Ok(array.into_any())
 }
 
-/// How samples are smoothed.
+/// The options of smoothing.
 pub(crate) struct Smooth<'a> {
     pub(crate) kernel: Option<&'a str>,
     pub(crate) low_pass: Option<f64>,
@@ -103,13 +103,13 @@ pub(crate) struct Smooth<'a> {
     pub(crate) ends: &'a str,
 }
 
-/// Why a kernel cannot be made.
+/// The exception for an invalid smoothing kernel.
 fn of_kernel(name: &str, error: &SmoothingError) -> PyErr {
     input(format!("{name}: {error}"))
 }
 
 impl Smooth<'_> {
-    /// The smoothing of arrays.
+    /// The options of smoothing for arrays.
     fn smoothing(&self) -> PyResult<Smoothing> {
         let rate = self.fps.map(frame_rate).transpose()?;
         let mut smoothing = self.of_kernel()?;
@@ -149,7 +149,7 @@ impl Smooth<'_> {
     }
 }
 
-/// A clip without its noise.
+/// Smooths a clip at its keys, or at the frames of a rate.
 pub(crate) fn smooth_clip(
     engine: &Engine,
     clip: &Bound<'_, Clip>,
@@ -236,7 +236,7 @@ fn are_vectors(value: &Bound<'_, PyAny>) -> PyResult<bool> {
     Ok(doubles(value, "samples")?.shape.last() == Some(&3))
 }
 
-/// Vectors of any shape, without the axis of their components.
+/// Vectors (…, 3) of any shape, and this shape without the last axis.
 fn vectors(value: &Bound<'_, PyAny>, name: &str) -> PyResult<(Vec<usize>, Vec<Vec3>)> {
     let ArrayValues { mut shape, values } = doubles(value, name)?;
     if shape.pop() != Some(3) {
@@ -249,7 +249,7 @@ fn vectors(value: &Bound<'_, PyAny>, name: &str) -> PyResult<(Vec<usize>, Vec<Ve
     Ok((shape, vectors.collect()))
 }
 
-/// The weighted sum of layers, normalised.
+/// `Engine.blend`: the normalised weighted sum of layers.
 pub(crate) fn blend<'py>(
     engine: &Engine,
     layers: &Bound<'py, PyAny>,
@@ -303,7 +303,7 @@ fn check_shape(name: &str, shape: &[usize], first: &[usize], of: &str) -> PyResu
     }
 }
 
-/// Slerp from each rotation to that of the other.
+/// `Engine.mix`: slerp from each rotation of one array to that of the other.
 pub(crate) fn mix<'py>(
     engine: &Engine,
     [first, second]: [&Bound<'py, PyAny>; 2],
@@ -429,7 +429,7 @@ impl<'py> ModelPoses<'_, 'py> {
     }
 }
 
-/// The translations or the scales of all joints, and which of them have any.
+/// The translations or scales of all joints, and which joints have any.
 fn channel(
     value: Option<&Bound<'_, PyAny>>,
     name: &str,
@@ -558,7 +558,7 @@ pub(crate) fn matrices(value: &Bound<'_, PyAny>, tracks: usize) -> PyResult<Vec<
     Ok(values.chunks_exact(4 * rows).map(matrix).collect())
 }
 
-/// Samples as an array of NumPy's: (tracks, frames, components), or as the layout has it.
+/// Samples as a NumPy array of shape (tracks, frames, components), or (frames, tracks, components) with layout "frame".
 pub(crate) fn of_values<'py, T, const N: usize>(
     py: Python<'py>,
     found: &Samples<T>,

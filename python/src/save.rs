@@ -37,7 +37,7 @@ use crate::names::option_named;
 use crate::options::{EvaluationKeywords, SampleChoice};
 use crate::run::interruptible;
 
-/// Rotations evaluated at once.
+/// The number of rotations that are evaluated at once.
 const CHUNK: usize = 1 << 20;
 
 /// Writes clips to a file, atomically; the format is that of the file's ending.
@@ -211,7 +211,7 @@ struct Save {
     path: PathBuf,
 }
 
-/// The samples of a clip that are asked for.
+/// The requested samples of a clip.
 fn requested(
     clip: &Motion,
     request: &EvaluationKeywords,
@@ -239,7 +239,7 @@ fn of_end_frame(error: EndFrameError) -> PyErr {
     input(format!("{error}; {remedy}"))
 }
 
-/// Ends writing when the work is stopped.
+/// A writer that fails as soon as the work is stopped (Ctrl-C), so that writing ends.
 struct Stoppable<W> {
     out: W,
     stop: Stop,
@@ -303,7 +303,7 @@ impl Save {
         })
     }
 
-    /// That the skeleton is left out, where rotations alone are written.
+    /// The warning that a format of rotations does not store the skeleton.
     fn lost(&self) -> Option<Diagnostic> {
         let hangs = |clip: &Clip| {
             let rest = |joint: &tumble_formats::motion::Joint| {
@@ -366,7 +366,7 @@ impl Save {
         lost.collect()
     }
 
-    /// Keys at their own times.
+    /// Writes the keys at their times, without sampling.
     fn keys(&self, out: &mut dyn Write, times: &mut Vec<u8>) -> PyResult<Vec<Diagnostic>> {
         if !self.format.writes_clips() {
             return Err(input(format!(
@@ -432,7 +432,7 @@ impl Save {
         Ok(warnings)
     }
 
-    /// The file of the clips, with other keys.
+    /// Writes the clips' file again with other keys.
     fn baked(
         &self,
         clips: &[&Motion],
@@ -458,7 +458,7 @@ impl Save {
         Ok(warnings)
     }
 
-    /// The rule for the end of a new result.
+    /// The rule for the frame at the end of a clip, in a new file.
     fn end_frame_of(&self, kind: SampledKind) -> PyResult<EndFrame> {
         let result = SampledResult {
             format: self.format,
@@ -477,7 +477,7 @@ impl Save {
         })
     }
 
-    /// Clips as a new file.
+    /// Writes clips to a new file.
     fn sampled(
         &self,
         clips: &[&Motion],
@@ -527,7 +527,7 @@ impl Save {
         notes
     }
 
-    /// The rotations of one clip.
+    /// Writes the rotations of one clip.
     fn rotations(
         &self,
         clip: &Motion,
@@ -578,7 +578,7 @@ impl Save {
     }
 }
 
-/// Evaluates in chunks.
+/// Evaluates a clip in chunks into a writer.
 fn stream(
     engine: &Engine,
     clip: &Motion,
@@ -587,7 +587,7 @@ fn stream(
     layout: Layout,
     mut sink: impl FnMut(&[glam::Quat]) -> PyResult<()>,
 ) -> PyResult<()> {
-    /// Why a stream ends early.
+    /// The error that ends a stream early.
     enum Ended {
         Evaluating(Error),
         Sink(PyErr),

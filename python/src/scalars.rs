@@ -12,7 +12,7 @@ use crate::names::unknown_name;
 use crate::options::EvaluationKeywords;
 use crate::run::interruptible;
 
-/// Evaluates the scalars of these names, or all.
+/// Evaluates the scalars with these names, or all if there are no names.
 pub(crate) fn evaluate<'py>(
     engine: &Engine,
     clip: &Bound<'py, Clip>,

@@ -23,7 +23,7 @@ fn ended(outcome: Result<String, Refused>) -> Outcome {
     }
 }
 
-/// A refusal as an exception: a `ValueError` with the exit code and the message.
+/// Converts a failure to an exception: a `ValueError` with the exit code and the message.
 fn refuse(refused: Refused) -> PyErr {
     pyo3::exceptions::PyValueError::new_err((refused.code, refused.message))
 }
@@ -102,7 +102,7 @@ impl Plan {
         py.detach(|| guarded(|| self.plan.claim(&folder).map_err(refuse)))
     }
 
-    /// Which plan it is.
+    /// The identity of the plan.
     #[getter]
     fn id(&self) -> &str {
         self.plan.id()
@@ -114,13 +114,13 @@ impl Plan {
         self.plan.options()
     }
 
-    /// How many inputs there are.
+    /// The number of inputs.
     #[getter]
     fn inputs(&self) -> usize {
         self.plan.inputs()
     }
 
-    /// How many shards there are.
+    /// The number of shards.
     fn __len__(&self) -> usize {
         self.plan.shards()
     }
@@ -166,7 +166,7 @@ impl Worker {
         })
     }
 
-    /// How its device is called.
+    /// The name of its device.
     #[getter]
     fn device(&self) -> &str {
         &self.device
@@ -244,7 +244,7 @@ impl Record {
         self.record.is_whole()
     }
 
-    /// Which plan the shard is of.
+    /// The identity of the shard's plan.
     #[getter]
     fn plan(&self) -> &str {
         self.record.plan()
@@ -271,7 +271,7 @@ impl Record {
         self.record.is_made_from(&inputs, options)
     }
 
-    /// Puts a file of rows in the place of its results.
+    /// Replaces its results by a file of rows.
     #[allow(clippy::too_many_arguments, reason = "what a line of a manifest says")]
     #[pyo3(signature = (name, *, sha256, bytes, library, inputs_sha256, into))]
     fn join(

@@ -27,17 +27,17 @@ pub(crate) struct Chunks {
     layout: Layout,
     frames: SampleTimes,
     source: ChunkSource,
-    /// Rows and columns that a chunk has at most; rows are tracks or frames, as the layout has it.
+    /// The largest number of rows and columns of a chunk; rows are tracks or frames, depending on the layout.
     each: (usize, usize),
     /// The row and the column where the next chunk starts.
     next: Mutex<(usize, usize)>,
 }
 
-/// How the rotations of a chunk are made.
+/// How the rotations of a chunk are computed.
 enum ChunkSource {
-    /// Tracks that are prepared for each chunk.
+    /// The tracks are prepared anew for each chunk.
     Tracks(Box<PerTrack<Interpolation>>),
-    /// Tracks that have been prepared.
+    /// The tracks have been prepared once, before the first chunk.
     Prepared(tumble::Clip),
 }
 
@@ -226,7 +226,7 @@ impl Chunk {
                 .is_truthy()?)
     }
 
-    /// By its fields.
+    /// Pickles the fields.
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Pickled<'py>> {
         pickled(slf)
     }

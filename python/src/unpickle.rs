@@ -21,7 +21,7 @@ fn made<'py, T: Value>(state: &Bound<'py, PyTuple>) -> PyResult<Bound<'py, PyAny
     Ok(Bound::new(state.py(), value)?.into_any())
 }
 
-/// The classes by their names.
+/// The classes that can be unpickled, by name.
 const MAKERS: [(&str, Maker); 13] = [
     ("ArrayDifference", made::<ArrayDifference>),
     ("ChannelDifference", made::<ChannelDifference>),
@@ -38,7 +38,7 @@ const MAKERS: [(&str, Maker); 13] = [
     ("Walk", made::<Walk>),
 ];
 
-/// The value of a pickle.
+/// Restores the value of a pickle.
 #[pyfunction]
 pub(crate) fn value_of_state<'py>(
     name: &str,

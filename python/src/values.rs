@@ -12,7 +12,7 @@ use crate::errors::input;
 pub(crate) trait Value:
     PyClass<Frozen = True> + Sync + Into<PyClassInitializer<Self>>
 {
-    /// Its fields.
+    /// The fields as Python objects.
     fn state<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>>;
 
     /// The value with these fields.
@@ -42,18 +42,18 @@ macro_rules! value {
 }
 pub(crate) use value;
 
-/// A pickle that this version has not written.
+/// The error for a pickle that this version of the package did not write.
 pub(crate) fn broken() -> PyErr {
     input("the pickle of a result is broken, or of another version of tumble")
 }
 
-/// The result of `__reduce__`: the function that makes a value again, and its arguments.
+/// The result of `__reduce__`: the function that restores a value, and its arguments.
 pub(crate) type Pickled<'py> = (
     Bound<'py, PyAny>,
     (Bound<'py, PyString>, Bound<'py, PyTuple>),
 );
 
-/// How a value is pickled.
+/// Pickles a value: `__reduce__` of its class.
 pub(crate) fn pickled<'py, T: Value>(value: &Bound<'py, T>) -> PyResult<Pickled<'py>> {
     let py = value.py();
     let again = py.import("tumble._tumble")?.getattr("value_of_state")?;
@@ -61,7 +61,7 @@ pub(crate) fn pickled<'py, T: Value>(value: &Bound<'py, T>) -> PyResult<Pickled<
     Ok((again, (name, value.get().state(py)?)))
 }
 
-/// Rows of so many numbers as an array.
+/// Rows of `N` numbers as an array of shape (rows, N).
 pub(crate) fn rows<T: Element>(
     py: Python<'_>,
     numbers: Vec<T>,
@@ -71,7 +71,7 @@ pub(crate) fn rows<T: Element>(
     PyArray1::from_vec(py, numbers).reshape([count, each])
 }
 
-/// Rows of so many numbers, of an array.
+/// The rows of an array of shape (rows, N).
 pub(crate) fn chunks<T: Element + Copy, const N: usize>(
     of: &Bound<'_, PyAny>,
 ) -> PyResult<Vec<[T; N]>> {
@@ -84,7 +84,7 @@ pub(crate) fn chunks<T: Element + Copy, const N: usize>(
     array.outer_iter().map(row).collect()
 }
 
-/// The numbers of an array of one axis.
+/// The numbers of a one-dimensional array.
 pub(crate) fn list<T: Element + Copy>(of: &Bound<'_, PyAny>) -> PyResult<Vec<T>> {
     let array: PyReadonlyArray1<'_, T> = of.extract()?;
     Ok(array.as_array().iter().copied().collect())

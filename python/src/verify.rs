@@ -103,7 +103,7 @@ impl Verification {
 
 #[pymethods]
 impl Verification {
-    /// By its fields.
+    /// Pickles the fields.
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Pickled<'py>> {
         pickled(slf)
     }

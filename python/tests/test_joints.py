@@ -201,7 +201,7 @@ def differing(keys):
         (made(keys, parents=[None, None, 0, 1, 2]), "`left` has the parent `hip` in .*, but is a root in "),
         (made(keys, parents=[1, None, 0, 1, 2]), "`hip` is a root in .*, but has the parent `left`"),
         (made(keys, names=["hip", "left", "left", "left toe", "right toe"]), "two joints `left`"),
-        (made(keys, names=None), "names; name both, or neither to match them by index|none of the same name"),
+        (made(keys, names=None), "names; joints are matched by name, or by index if neither clip has names|none of the same name"),
         (tumble.Clip(TIMES, keys[:1], names=["hip"], parents=[None]), "joint `left`.* none of that name$"),
     ]
 

@@ -80,7 +80,7 @@ impl<'a> ShortRuns<'a> {
         if class != self.class {
             let starts = &prepared.spans.starts[part.spans.clone()];
             let found = (self.frames).find(starts, part.end, self.clock, &self.samples);
-            // The caller then evaluates the row in another way, which reports an interval with too many frames.
+            // On an error, the caller evaluates the row by the general path, which reports an interval with too many frames.
             let Ok((samples, number)) = found else {
                 return false;
             };

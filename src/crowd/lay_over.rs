@@ -126,7 +126,7 @@ fn slerp<L: Lanes, const VECTORS: usize>(
     let (sum, difference) = chord(from, to);
     let square = dot(difference, difference);
     let whole = dot(sum, sum);
-    // If the square is 0, the difference is 0 too, and multiplying it by this large number changes nothing.
+    // The reciprocal root of 0 is large but finite. The difference is 0 then, and so is its product with this number.
     let (inverse, to_unit) = (reciprocal_root(square), reciprocal_root(whole));
     let (small, large) = (root_by(square, inverse), root_by(whole, to_unit));
     if (small - large).any_at_least(0.0) {

@@ -288,7 +288,7 @@ pub enum InterpolationError {
     OpenLoop {
         /// The track's index in the set.
         track: usize,
-        /// The angle between the first key and the last, degrees.
+        /// The angle between the first key and the last, degrees; `Ends::Loop` needs equal keys.
         degrees: f64,
     },
 }

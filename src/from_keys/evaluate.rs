@@ -62,8 +62,8 @@ impl<'a> KeyEvaluator<'a> {
         }
     }
 
-    /// Evaluates the samples of a batch that are in `window`, `[track][sample]`; returns the tracks that may have
-    /// samples that are not resolved, counted in the batch, in order.
+    /// Evaluates the samples of a batch that are in `window`, `[track][sample]`. Returns the tracks that may have
+    /// unresolved samples: their indices in the batch, ascending.
     pub(crate) fn evaluate(
         &mut self,
         set: &'a TrackSet,

@@ -88,7 +88,7 @@ pub(crate) struct Buffer {
 // SAFETY: the pointer is to memory that belongs to the buffer alone; access goes
 // through `&self` for reading and `&mut self` for writing.
 unsafe impl Send for Buffer {}
-// SAFETY: as above.
+// SAFETY: the memory belongs to the buffer alone, and `&self` only reads it.
 unsafe impl Sync for Buffer {}
 
 /// The size of the largest element that a kernel reads.

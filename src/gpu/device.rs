@@ -340,10 +340,10 @@ impl Drop for LogicalDevice {
         }
         // SAFETY: every object created from it held an `Arc` to this and is gone.
         unsafe { self.shared.free(&self.raw) };
-        // SAFETY: as above.
+        // SAFETY: every object created from the device held an `Arc` to it and is gone.
         unsafe { self.pipelines.destroy(&self.raw) };
         if self.owned {
-            // SAFETY: as above.
+            // SAFETY: every object created from the device held an `Arc` to it and is gone.
             unsafe { self.raw.destroy_device(None) };
         }
     }

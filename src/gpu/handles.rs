@@ -157,7 +157,7 @@ impl VulkanHandles {
 /// is older than 1.1. An application may state a newer version than its loader's, which then counts: Vulkan has no
 /// query for the version of an instance, so that a mistake cannot be told from this.
 fn usable_version(stated: u32, loader: u32) -> Option<u32> {
-    let is_vulkan = vk::api_version_variant(stated) == 0; // others are other interfaces, such as Vulkan SC
+    let is_vulkan = vk::api_version_variant(stated) == 0; // another variant is another interface, such as Vulkan SC
     (is_vulkan && stated >= vk::API_VERSION_1_1).then_some(stated.min(loader))
 }
 

@@ -228,7 +228,7 @@ fn loader() -> Result<ash::Entry, VulkanError> {
     let default = unsafe { ash::Entry::load() };
     default.or_else(|error| {
         let others = HOMEBREW.iter().filter(|_| cfg!(target_os = "macos"));
-        // SAFETY: as above.
+        // SAFETY: loading a library runs its initialisers, which is intended.
         let mut found = others.filter_map(|path| unsafe { ash::Entry::load_from(path) }.ok());
         found.next().ok_or_else(|| VulkanError::NoLoader {
             reason: error.to_string(),

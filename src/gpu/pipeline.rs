@@ -135,7 +135,7 @@ impl Pipeline {
         let info = vk::PipelineLayoutCreateInfo::default()
             .set_layouts(&set_layouts)
             .push_constant_ranges(&constants);
-        // SAFETY: as above.
+        // SAFETY: the device is alive; the created object is destroyed with the pipeline.
         pipeline.layout = unsafe { device.raw.create_pipeline_layout(&info, None) }
             .named("vkCreatePipelineLayout")?;
 

@@ -43,8 +43,8 @@ struct MemoryBlock {
     free: FreeRanges,
 }
 
-// SAFETY: the pointer is to mapped memory that goes from thread to thread with the block; each part of
-// it is used by the one buffer that holds it.
+// SAFETY: the pointer is to mapped memory, which moves between threads together with the block; each range of it belongs
+// to exactly one buffer.
 unsafe impl Send for MemoryBlock {}
 
 impl SharedMemory {

@@ -65,17 +65,17 @@ impl Submission {
         let info = vk::CommandBufferAllocateInfo::default()
             .command_pool(submission.pool)
             .command_buffer_count(1);
-        // SAFETY: as above.
+        // SAFETY: the device is alive; `drop` destroys what was created.
         submission.commands =
             unsafe { raw.allocate_command_buffers(&info) }.named("vkAllocateCommandBuffers")?[0];
-        // SAFETY: as above.
+        // SAFETY: the device is alive; `drop` destroys what was created.
         submission.fence = unsafe { raw.create_fence(&vk::FenceCreateInfo::default(), None) }
             .named("vkCreateFence")?;
         if lane == QueueLane::Kernels && device.physical.timestamp_bits() > 0 {
             let info = vk::QueryPoolCreateInfo::default()
                 .query_type(vk::QueryType::TIMESTAMP)
                 .query_count(2);
-            // SAFETY: as above.
+            // SAFETY: the device is alive; `drop` destroys what was created.
             submission.stamps =
                 unsafe { raw.create_query_pool(&info, None) }.named("vkCreateQueryPool")?;
         }
@@ -117,7 +117,7 @@ impl Submission {
             .named("vkResetCommandPool")?;
         let info = vk::CommandBufferBeginInfo::default()
             .flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
-        // SAFETY: as above.
+        // SAFETY: the command buffer was just reset, and is not in use.
         unsafe { raw.begin_command_buffer(self.commands, &info) }.named("vkBeginCommandBuffer")?;
         if self.stamps != vk::QueryPool::null() {
             let start = vk::PipelineStageFlags::TOP_OF_PIPE;

@@ -13,13 +13,13 @@ use crate::math::quaternion::{
 pub(crate) trait Algebra {
     /// f64, or a vector of them.
     type Number: Real;
-    /// See [`exp`].
+    /// [`exp`]: the quaternion whose logarithm is `a`.
     fn exp(&mut self, a: [Self::Number; 3]) -> [Self::Number; 4];
-    /// See [`log`].
+    /// [`log`]: the principal logarithm of `q`.
     fn log(&mut self, q: [Self::Number; 4]) -> [Self::Number; 3];
-    /// See [`log_toward`].
+    /// [`log_toward`]: as `log`, with the direction `axis` where `q` = -1 has none.
     fn log_toward(&mut self, q: [Self::Number; 4], axis: [Self::Number; 3]) -> [Self::Number; 3];
-    /// See [`log_near`].
+    /// [`log_near`]: the branch of the logarithm of `q` that is nearest to `near`.
     fn log_near(&mut self, q: [Self::Number; 4], near: [Self::Number; 3]) -> [Self::Number; 3];
     /// The logarithm of a step between keys; `near` is the one that [`PrincipalRange`] gave.
     fn log_of_step(
@@ -55,7 +55,7 @@ impl Algebra for FullRange {
         log_near(q, near)
     }
 
-    // Not by `near`, whose error is up to 1e-12: a long tangent multiplies the error of this logarithm.
+    // `near` is not used, because its error is up to 1e-12, and a long tangent multiplies the error of this logarithm.
     #[inline(always)]
     fn log_of_step(&mut self, step: Quaternion, _: Vector) -> Vector {
         log(step)
@@ -259,7 +259,7 @@ impl<R: Real> Algebra for PrincipalRange<R> {
 
     #[inline(always)]
     fn log_near(&mut self, q: [R; 4], near: [R; 3]) -> [R; 3] {
-        // Up to this length of `near` no other branch is nearer than the principal one.
+        // If `near` is shorter than this, the principal branch is the nearest one.
         self.check(square(near), 1.5 * 1.5);
         self.log(q)
     }

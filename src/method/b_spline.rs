@@ -139,7 +139,8 @@ fn after_last(intervals: &Intervals, lane: usize, end: EndCondition) -> Vector {
         EndCondition::Secant => log,
         EndCondition::Clamped(half) => scaled(half, intervals.durations[lane]),
     };
-    // The unknown step also rotates the slope of this interval's step, so the equation is iterated.
+    // The unknown step occurs on both sides of the equation, because it also rotates the slope of this interval.
+    // Therefore the equation is solved by fixed-point iteration.
     let interval_slope = c1 + 2.0 * c2 + 3.0 * c3;
     (0..END_ITERATIONS).fold(log, |step, _| {
         let rotated_log = rotated(exp(scaled(step, -value3)), log);

@@ -61,7 +61,7 @@ const QUATERNION: Representation = Representation {
 
 /// The fields that the encodings of rotations in f32 share.
 const OF_ROTATIONS: Representation = Representation {
-    error_bound: Some(4e-6), // most of which is the error of decoding
+    error_bound: Some(4e-6), // mostly the error of decoding, not of encoding
     takes_vectors: false,
     ..QUATERNION
 };

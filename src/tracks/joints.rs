@@ -74,8 +74,8 @@ pub enum JointMatchError {
     },
     /// The joints of one clip have names, those of the other have none.
     #[error(
-        "{named} has a joint `{name}`, but the joints of {unnamed} have no names; name both, or neither to match them by \
-         index"
+        "{named} has a joint `{name}`, but the joints of {unnamed} have no names; joints are matched by name, or by \
+         index if neither clip has names"
     )]
     Unnamed {
         /// The name of the clip with names in messages.
@@ -501,8 +501,8 @@ mod tests {
         let matched = unnamed(3).pairs(&part, LABELS).unwrap();
         assert_eq!(matched.pairs, [[0, 0], [2, 1]]);
         assert_eq!(matched.missing, [vec![1], vec![]]);
-        let text = "b has a joint `hip`, but the joints of a have no names; name both, or neither to match them by \
-                    index";
+        let text = "b has a joint `hip`, but the joints of a have no names; joints are matched by name, or by index \
+                    if neither clip has names";
         refused(&unnamed(2), &chain(&["hip", "arm"]), text);
     }
 
@@ -534,8 +534,8 @@ mod tests {
         );
         // Only numbers without leading zeros count as numbers.
         let padded = Joints::named(["joint00", "joint1"]);
-        let text = "b has a joint `joint00`, but the joints of a have no names; name both, or neither to match them by \
-                    index";
+        let text = "b has a joint `joint00`, but the joints of a have no names; joints are matched by name, or by \
+                    index if neither clip has names";
         refused(&Joints::named(["", ""]), &padded, text);
     }
 

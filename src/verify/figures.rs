@@ -274,7 +274,8 @@ impl Bench {
         }
     }
 
-    /// The calls of a row: few on software devices, where a call takes as long in a row as alone.
+    /// The number of calls that are submitted back to back and timed together. Few on software devices, where a call takes
+    /// equally long in a series and alone.
     fn row(&self) -> u32 {
         if self.is_software { 2 } else { 32 }
     }

@@ -1,5 +1,5 @@
-// Bodies on paths, drawn by three.js: a box for each, the curve that it goes along, and frames as small axes
-// on the curve (x red, y green, z blue).
+// Bodies that follow paths, drawn by three.js: a box for each body, the path as a curve, and the body's orientation at
+// some points of the path as three small axes (x red, y green, z blue).
 
 import {
   BoxGeometry, Color, Group, InstancedMesh, Matrix4, MeshBasicMaterial, MeshLambertMaterial, Quaternion, Vector3,
@@ -7,16 +7,18 @@ import {
 import { position } from "./data.js";
 import { look } from "./look.js";
 
-// Of the length of a body: how broad and high it is, how thick and long lines and axes are.
+// Sizes as multiples of the body's length: breadth and height of the box, thickness of the curve, thickness and length
+// of the axes.
 const BREADTH = 0.6;
 const HEIGHT = 0.4;
 const LINE = 0.05;
 const AXIS = 0.04;
 const AXIS_LENGTH = 0.55;
 const AXES = [0xd55e00, 0x009e73, 0x0072b2];
-// The curve, on light ground and on dark.
+// The colour of the curve; it is readable on the light and on the dark background.
 const CURVE = 0x6b727a;
-// Lines of more pieces than this are drawn more coarsely, in all and along one path.
+// The largest number of straight pieces that the curves of all bodies are drawn with; longer clips use every second,
+// third … sample.
 const MOST_PIECES = 40_000;
 
 export class Bodies {
@@ -44,7 +46,7 @@ export class Bodies {
     this.paint(-1);
   }
 
-  /** The curves and the axes on them, which stand still. */
+  /** The meshes of the curves and of the axes on them. They do not depend on the time, so they are made once. */
   lines(ghost) {
     const { boxes, samples, bodies } = this.input;
     const step = Math.max(1, Math.ceil((samples * boxes) / MOST_PIECES));
@@ -84,7 +86,7 @@ export class Bodies {
     return new Vector3(...position(this.result, this.input.boxes, sample, body));
   }
 
-  /** Colours the bodies; the chosen one (-1: none) is lighter. */
+  /** Colours the bodies; the selected one is lighter (`chosen`: its index, -1 for none). */
   paint(chosen) {
     const colour = new Color();
     const white = new Color(0xffffff);
@@ -114,7 +116,7 @@ export class Bodies {
     this.axes.position.x = shift;
   }
 
-  /** Places that bodies take at some samples. */
+  /** The positions of all bodies at up to about 200 samples, for the bounding box of the view. */
   points(result, samples) {
     const points = [];
     const step = Math.max(1, Math.floor(samples / 200));
@@ -126,14 +128,14 @@ export class Bodies {
     return points;
   }
 
-  /** Where a body is: read back from what is drawn. */
+  /** The position of a body as it is drawn: read from the mesh, so that tests check the picture and not the input. */
   ends(body) {
     const matrix = new Matrix4();
     this.meshes[0].getMatrixAt(body, matrix);
     return [new Vector3().setFromMatrixPosition(matrix).toArray()];
   }
 
-  /** How a body is turned: read back from what is drawn. */
+  /** The rotation x y z w of a body as it is drawn, read from the mesh like `ends`. */
   shown(body) {
     const matrix = new Matrix4();
     this.meshes[0].getMatrixAt(body, matrix);
@@ -149,7 +151,7 @@ export class Bodies {
   }
 }
 
-/** Straight bars between pairs of places. */
+/** One mesh with a straight bar between the two points of each pair. */
 function bars(pairs, breadth, material) {
   const mesh = new InstancedMesh(new BoxGeometry(1, 1, 1), material, pairs.length);
   mesh.frustumCulled = false;

@@ -8,14 +8,15 @@ import { position } from "./data.js";
 import { look } from "./look.js";
 import { Skin } from "./skin.js";
 
-// How far a bone is broad, of its length; and where, from the joint to the parent.
+// The breadth of a bone as a fraction of its length, and where it is broadest (0: at the joint, 1: at the parent).
 const BREADTH = 0.18;
 const BROADEST = 0.85;
-// The edge of a root's cube, of the middle one of all bones' lengths; or of the extent where no bone has any.
+// The edge of a root's cube: CUBE times the median bone length, or LONE_CUBE times the extent of the motion if all bones
+// have length 0.
 const CUBE = 0.2;
 const LONE_CUBE = 0.03;
 
-/** A bone of length 1: its joint at the origin, its parent at (0, -1, 0), flat sides. */
+/** The geometry of a bone of length 1, an octahedron: the joint at the origin, the parent at (0, -1, 0). */
 function octahedron() {
   const half = BREADTH / 2;
   const ring = [[half, 0], [0, half], [-half, 0], [0, -half]].map(([x, z]) => [x, -BROADEST, z]);
@@ -29,7 +30,7 @@ function octahedron() {
   return geometry;
 }
 
-/** All joints, each after its parent. */
+/** The indices of all joints, sorted so that each comes after its parent. */
 function parentsFirst(parents) {
   const order = [];
   const placed = parents.map(() => false);
@@ -44,7 +45,7 @@ function parentsFirst(parents) {
   return order;
 }
 
-/** Where the joints of one result are at a sample. */
+/** The meshes of one skeleton; `place` moves them to a sample of a result. */
 export class Bones {
   constructor(input, result, colours, ghost) {
     this.input = input;
@@ -57,7 +58,7 @@ export class Bones {
     const lengths = input.parents.map((_, joint) => this.bone(joint).length());
     const some = lengths.filter((length) => length > 0).sort((a, b) => a - b);
     const extent = Math.max(...result.positions.size);
-    /** A length to judge distances by. */
+    /** The median bone length: the unit for sizes and margins of the view. */
     this.length = some[some.length >> 1] ?? (extent * LONE_CUBE) / CUBE;
     if (!(this.length > 0)) this.length = 1;
 
@@ -81,7 +82,7 @@ export class Bones {
     this.paint(-1);
   }
 
-  /** Places and rotations in the world at a sample. */
+  /** Computes the world position and rotation of each joint at a sample, into `places` and `turned`. */
   find(result, sample) {
     const { boxes, parents, isWorld } = this.input;
     for (const joint of this.order) {
@@ -91,13 +92,13 @@ export class Bones {
     }
   }
 
-  /** From the parent to the joint; nothing for a root. */
+  /** The vector from the parent to the joint; zero for a root. */
   bone(joint) {
     const parent = this.input.parents[joint];
     return parent < 0 ? new Vector3() : this.places[joint].clone().sub(this.places[parent]);
   }
 
-  /** That axis of the parent which is farthest from the bone's direction: it turns the bone about itself. */
+  /** The axis of the parent that is closest to perpendicular to the bone. It defines the roll of the drawn bone. */
   acrossAxis(joint) {
     const parent = this.input.parents[joint];
     if (parent < 0) return null;
@@ -107,7 +108,7 @@ export class Bones {
     return new Vector3(...axis);
   }
 
-  /** Colours the bones; the chosen one (-1: none) is lighter. */
+  /** Colours the bones; the selected one is lighter (`chosen`: its joint, -1 for none). */
   paint(chosen) {
     const colour = new Color();
     for (const mesh of this.meshes) {
@@ -123,7 +124,7 @@ export class Bones {
   place(result, sample, { shift, matrices, hasSkin }) {
     this.find(result, sample);
     if (this.skin) {
-      // Scales are in the engine's matrices alone.
+      // Only the engine's matrices contain scales; `places` and `turned` do not. Without matrices, hide a scaled mesh.
       const canFollow = matrices || !this.input.stored.hasScales;
       this.skin.mesh.visible = Boolean(hasSkin && canFollow);
       if (canFollow) this.skin.follow({ matrices, places: this.places, turned: this.turned }, shift);
@@ -140,7 +141,7 @@ export class Bones {
         } else {
           const along = this.bone(joint);
           const length = along.length();
-          // A bone without length is not seen, whichever way it points.
+          // A bone of length 0 is invisible, so its direction does not matter.
           if (length > 0) along.divideScalar(length);
           else along.set(0, 1, 0);
           across.copy(this.axes[joint]).applyQuaternion(this.turned[parent]);
@@ -156,7 +157,10 @@ export class Bones {
     }
   }
 
-  /** Places that all joints take: at some samples, and wherever one is farthest out. */
+  /**
+   * Positions for the bounding box of the view: all joints at about 60 samples, the extreme position along each axis over
+   * all samples, and points of the skinned mesh at about 6 samples.
+   */
   points(result, samples) {
     const { boxes } = this.input;
     const points = [];
@@ -186,7 +190,7 @@ export class Bones {
     return points;
   }
 
-  /** A joint, and its parent where it has one: read back from what is drawn. */
+  /** The position of a joint and, if it has one, of its parent, as they are drawn (read from the meshes, for tests). */
   ends(joint) {
     const matrix = new Matrix4();
     for (const mesh of this.meshes) {

@@ -1,16 +1,16 @@
-// The results that the page carries, unpacked, and those that its engine makes of the keys. Nothing here makes a
-// rotation that the engine has not made.
+// Reads the clips and results that are stored in the page, and evaluates others with the page's WebAssembly engine. All
+// rotations come from the engine; this file interpolates none.
 
 import { Live } from "./live.js";
 
-/** What base64 and an archive hold. */
+/** Decodes base64, then decompresses: `deflate` or `gzip`. Returns the bytes. */
 export async function inflated(text, format = "deflate") {
   const bytes = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
   const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream(format));
   return new Uint8Array(await new Response(stream).arrayBuffer());
 }
 
-/** The triangles of a mesh: places of vertices, and three vertices each. */
+/** Unpacks a mesh: `places`, x y z of each vertex, and `triangles`, three vertex indices each. */
 export async function mesh({ places, triangles }) {
   return {
     places: new Float32Array((await inflated(places)).buffer),
@@ -18,7 +18,7 @@ export async function mesh({ places, triangles }) {
   };
 }
 
-/** What joints carry. */
+/** Unpacks a skinned mesh: each vertex has four joints (`bonesOf`) and their weights; `toJoints` are inverse bind matrices. */
 export async function skin({ places, triangles, bonesOf, weights, joints, toJoints }) {
   return {
     ...(await mesh({ places, triangles })),
@@ -31,8 +31,8 @@ export async function skin({ places, triangles, bonesOf, weights, joints, toJoin
 
 const doubles = async (text) => new Float64Array((await inflated(text)).buffer);
 
-// Each sample is stored as its difference from the one before it, all low bytes before
-// all high bytes, which packs better.
+// Decodes 16-bit integers. Each sample is stored as its difference from the sample before it (`stride` numbers earlier), and
+// all low bytes come before all high bytes, because this compresses better.
 async function differences(text, stride) {
   const bytes = await inflated(text);
   const length = bytes.length / 2;
@@ -44,33 +44,34 @@ async function differences(text, stride) {
   return values;
 }
 
-/** One clip: its boxes or joints, sample times, keys, and results by each method. */
+/** One clip: its boxes or joints, its sample times [s], its keys, and its results for each method. */
 export class Set {
   constructor(stored) {
     this.stored = stored;
     this.name = stored.name;
     this.boxes = stored.boxes;
     this.length = stored.length;
-    // Of joints: what each hangs on (-1: nothing), and its name. Boxes of a chain have neither.
+    // The parent of each joint (-1: root) and its name. Both are empty for the boxes of a chain.
     this.parents = stored.parents;
     this.names = stored.names;
     this.isWorld = stored.isWorld;
     this.isSkeleton = stored.parents.length > 0;
-    // How bodies on paths are drawn, where tracks are these.
+    // The sizes to draw with, if the tracks are bodies that follow paths; otherwise null.
     this.bodies = stored.bodies;
     this.hasFrames = stored.hasFrames;
-    // Those that the page has frames of.
+    // The methods whose frames are stored in the page.
     this.written = stored.results.map((result) => result.method);
     this.methods = this.written;
     this.results = new Map();
-    // Clips of other inputs that are shown with it.
+    // Clips of other inputs that can be drawn together with this clip.
     this.ghosts = [];
-    // The engine's clip, if the page can evaluate the keys; the frames a second, if not those that were written.
+    // `live`: the clip in the page's engine; null if the page has no engine or no keys. `rate`: frames per second; null for
+    // the frames that are stored in the page.
     this.live = null;
     this.rate = null;
   }
 
-  /** Lets the engine evaluate the keys. */
+  /** Uploads the clip's keys to the page's engine, so that further methods, rates and times can be evaluated. */
   async enliven(engine, options) {
     if (!engine || !this.stored.clip) return;
     const { bytes, methods } = this.stored.clip;
@@ -87,7 +88,11 @@ export class Set {
     this.keys = new Int16Array((await differences(this.stored.keys, 4)).buffer);
   }
 
-  /** The rotations by a method, [sample][box][xyzw] as 16-bit integers, the speeds, and where joints are. */
+  /**
+   * The result of a method: rotations [sample][box][xyzw], to be divided by `unit`; angular speeds [sample][box], rad/s after
+   * multiplying by `speedUnit`; positions of joints [sample][joint][xyz] in units of `scale` from `low`. Stored results have
+   * 16-bit integers.
+   */
   async result(method) {
     if (!this.results.has(method)) {
       const stored = this.rate === null && this.stored.results.find((result) => result.method === method);
@@ -114,7 +119,7 @@ export class Set {
     return this.results.get(method);
   }
 
-  /** Frames at another rate, and the keys between them; null: those that were written. */
+  /** Selects frames at another rate, together with the key times between them; null selects the stored frames. */
   setRate(rate) {
     const times = rate === null ? this.writtenTimes : this.live.times(rate, this.writtenTimes, this.boxes, this.keyTimes);
     this.results.clear();
@@ -122,13 +127,13 @@ export class Set {
     this.times = times;
   }
 
-  /** The key of a box at a time, from 0; -1 between keys. */
+  /** The index of the key of a box at a time; -1 if the time is between keys. */
   keyAt(box, time) {
     const near = 1e-9 * Math.max(1, Math.abs(time));
     return this.keysOf(box).times.findIndex((key) => Math.abs(key - time) <= near);
   }
 
-  /** The box that turns most: the sum of all that it turns by. */
+  /** The index of the box with the largest total rotation over the clip: its angular speed, summed over time. */
   busiest(result) {
     let [most, found] = [0, 0];
     for (let box = 0; box < this.boxes; box++) {
@@ -146,7 +151,7 @@ export class Set {
     return this.times.length;
   }
 
-  /** The last sample that is not after a time. */
+  /** The index of the last sample at or before a time. */
   sampleAt(time) {
     let low = 0;
     let high = this.samples - 1;
@@ -158,14 +163,14 @@ export class Set {
     return low;
   }
 
-  /** The sample nearest to a time. */
+  /** The index of the sample nearest to a time. */
   nearest(time) {
     const { times, samples } = this;
     const sample = this.sampleAt(time);
     return sample + 1 < samples && times[sample + 1] - time < time - times[sample] ? sample + 1 : sample;
   }
 
-  /** Key times of a box, and where its keys begin in `keys`. */
+  /** The key times of a box, and the index of its first key in `keys`. */
   keysOf(box) {
     const { sharedKeys, keyCounts } = this.stored;
     if (sharedKeys) {
@@ -177,7 +182,7 @@ export class Set {
   }
 }
 
-/** A stored rotation's components x y z w, of length 1. */
+/** A rotation of a result as a unit quaternion x y z w. Normalised, because stored components are rounded to 16 bits. */
 export function rotation(result, boxes, sample, box) {
   const at = (sample * boxes + box) * 4;
   const q = [0, 1, 2, 3].map((i) => result.rotations[at + i] / result.unit);
@@ -185,23 +190,23 @@ export function rotation(result, boxes, sample, box) {
   return q.map((component) => component / length);
 }
 
-/** Where a joint is in the world, x y z. */
+/** The world position x y z of a joint, relative to the clip's origin. */
 export function position({ positions }, joints, sample, joint) {
   const { low, scale, packed } = positions;
   const at = (sample * joints + joint) * 3;
   return low.map((least, axis) => least + packed[at + axis] * scale[axis]);
 }
 
-/** The decimals of lengths that are exact to about a thousandth of a percent of the clip's extent. */
+/** The number of decimals to print positions with: about 1e-5 of the clip's extent, the step of stored positions. */
 export function decimals({ positions }) {
   const extent = Math.max(...positions.size) || 1;
   return Math.min(Math.max(5 - Math.ceil(Math.log10(extent)), 0), 20);
 }
 
-/** Where a joint is, in words. */
+/** The world position of a joint as text. */
 export function placeInWords(result, joints, sample, joint) {
   const digits = decimals(result);
-  // No -0.00: what is rounded to zero loses its sign.
+  // Adding 0 turns -0 into 0, so that no `-0.00` is printed.
   const words = (value) => (Number(value.toFixed(digits)) + 0).toFixed(digits).replace("-", "−");
   return position(result, joints, sample, joint).map(words).join("  ");
 }

@@ -1,17 +1,18 @@
-// The clips of other inputs that are shown with one, at the same moment: where each is then, and how far apart they are.
+// Ghosts: clips of other inputs that are drawn translucent with the selected clip, at the same time. This file finds the
+// sample of a ghost at a time of the clip, and measures how far apart the joints of both are.
 
 import { position, rotation } from "./data.js";
 
-// Times closer than this are one moment, seconds.
+// Times that differ by less than this [s] count as equal.
 const SAME_TIME = 1e-6;
 
-/** Another clip beside one: `input`, with what the program has found out about both. */
+/** A ghost of a clip: its clip `input`, and how times and joints of the two correspond, as `tumble view` found it. */
 export class Ghost {
   constructor(input, { shift, pairs, inWorld, note }) {
     this.input = input;
-    // Added to a time of the clip: the same moment by the clock of the ghost.
+    // A time of the clip plus `shift` is the corresponding time of the ghost [s].
     this.shift = shift;
-    // Joints of the clip and of the ghost that are the same.
+    // Pairs of indices: a joint of the clip, and the same joint of the ghost.
     this.pairs = pairs;
     this.inWorld = inWorld;
     this.note = note;
@@ -19,18 +20,18 @@ export class Ghost {
     this.result = null;
   }
 
-  /** The clip as a ghost of this one. */
+  /** The reverse pair: the clip as a ghost of this ghost's clip. */
   reversed(clip) {
     const { shift, pairs, inWorld, note } = this;
     return new Ghost(clip, { shift: -shift, pairs: pairs.map(([own, other]) => [other, own]), inWorld, note });
   }
 
-  /** The joint that is the same as one of the clip's; -1 where there is none. */
+  /** The ghost's joint that corresponds to a joint of the clip; -1 if there is none. */
   partner(joint) {
     return this.pairs.find(([own]) => own === joint)?.[1] ?? -1;
   }
 
-  /** Loads its result by a method, or by its first where it is not shown by that. */
+  /** Loads the ghost's result for a method, or for the ghost's first method if it does not have this one. */
   async load(method) {
     const { input } = this;
     await input.unpack();
@@ -38,13 +39,16 @@ export class Ghost {
     this.result = await input.result(this.method);
   }
 
-  /** First and last time, by the clock of the clip. */
+  /** The ghost's first and last time, as times of the clip [s]. */
   get span() {
     const { times, samples } = this.input;
     return [times[0] - this.shift, times[samples - 1] - this.shift];
   }
 
-  /** A result and the sample of it at a time of the clip; null outside its own times. `late`: by how much, seconds. */
+  /**
+   * The ghost at a time of the clip: a result and the index of a sample in it; null outside the ghost's times. Without an
+   * engine this is the nearest stored sample; `late` is then its time minus the requested time [s].
+   */
   at(time) {
     const [first, last] = this.span;
     if (time < first - SAME_TIME || time > last + SAME_TIME) return null;
@@ -57,12 +61,15 @@ export class Ghost {
     return { result: input.live.pose(this.method, [own]), sample: 0, late: 0 };
   }
 
-  /** How far positions of the ghost are from those of the clip, which count from another origin. */
+  /** The vector to add to positions of the ghost, because its origin may differ from the clip's. */
   offset(clip) {
     return this.input.stored.origin.map((value, axis) => value - clip.stored.origin[axis]);
   }
 
-  /** The pair of joints that is furthest apart by an angle, and by a distance where both clips have positions. */
+  /**
+   * The joint pair with the largest angle [rad] and the one with the largest distance. The distance is NaN unless both clips
+   * have positions. `own`, `moment`: the result and sample of the clip and of the ghost.
+   */
   furthest(clip, own, moment) {
     const angle = (joint, other) =>
       this.inWorld
@@ -89,7 +96,7 @@ export class Ghost {
     return { angle: largest(angle), distance: largest(distance) };
   }
 
-  /** What is said of it while the clip is at a sample of a result. `decimals`: of lengths. */
+  /** The text beside the ghost's name in the list of clips: the largest differences. `decimals`: digits of distances. */
   words(clip, own, moment, decimals) {
     if (!moment) {
       const [first, last] = this.span.map((time) => time.toFixed(3));
@@ -110,12 +117,12 @@ export class Ghost {
   }
 }
 
-/** The rotation of a joint in the world, which only the drawn bones know of joints that have parents. */
+/** The world rotation of a joint. For a skeleton it comes from the drawn bones, because results are relative to parents. */
 function inWorld({ turned, result, sample }, input, joint) {
   return turned && (turned[joint]?.toArray() ?? rotation(result, input.boxes, sample, joint));
 }
 
-/** The angle between two rotations x y z w, radians; NaN where there are none. */
+/** The angle between two rotations x y z w [rad]; NaN if one is missing. */
 function apart(q, p) {
   if (!q || !p) return NaN;
   const [a, b, c, w] = q;

@@ -1,14 +1,14 @@
-// The engine that the page carries: what it makes of a clip's keys, with the bits of the program.
+// Evaluates a clip's keys with the WebAssembly engine in the page. The results are bit-identical to the program's.
 
 import { loadFrom } from "../../npm/package/core.js";
 import { inflated } from "./data.js";
 
-/** Bytes of a result that the page makes, at most. */
+/** The largest result that the page evaluates, bytes. */
 const LARGEST = 256e6;
-/** Of one rotation, with its speed and its position. */
+/** The bytes of one sample of one track: rotation, speed and position. */
 const SAMPLE = 48;
 
-/** The engine; null where the page carries none, or the browser runs none. */
+/** Starts the engine. Null if the page contains none, or if the browser cannot run it (it needs WebAssembly SIMD). */
 export async function engine(packed) {
   if (!packed) return null;
   try {
@@ -27,7 +27,10 @@ export class Live {
     this.isPlaced = isPlaced;
   }
 
-  /** Frames at a rate from the first of the times to the last, and the keys where these are no more. */
+  /**
+   * Sample times at a rate, from the first stored time to the last. Key times are added, so that keys are
+   * shown exactly, unless there are more keys than frames.
+   */
   times(rate, written, tracks, keys) {
     const [first, last] = [written[0], written[written.length - 1]];
     const count = Math.floor((last - first) * rate + 1e-6) + 1;
@@ -40,14 +43,14 @@ export class Live {
     return Float64Array.from(new Set(all)).sort();
   }
 
-  /** Rotations, speeds and positions at times, in the form of what was written. */
+  /** Rotations, angular speeds [rad/s] and positions at times, in the form of a stored result (see `Set.result`). */
   result(method, times) {
     const { values } = this.clip.velocities(times, { ...this.options, method });
     const speeds = Float32Array.from({ length: values.length / 3 }, (_, i) => Math.hypot(...values.subarray(3 * i, 3 * i + 3)));
     return { ...this.pose(method, times), speeds, speedUnit: 1 };
   }
 
-  /** The same without speeds. */
+  /** Like `result`, without speeds. */
   pose(method, times) {
     const options = { ...this.options, method };
     const { rotations } = this.clip.sample(times, options);
@@ -66,7 +69,7 @@ export class Live {
     return { low: [0, 0, 0], scale: [1, 1, 1], size: high.map((value, axis) => value - low[axis]), packed };
   }
 
-  /** Where points go that go with the joints, 16 numbers a joint. */
+  /** The matrix of each joint at a time, from joint axes to the view: 16 numbers per joint, column-major, with scales. */
   matrices(method, time) {
     const { matrices } = this.clip.matrices([time], { ...this.options, method });
     for (let i = 12; i < matrices.length; i += 16) {

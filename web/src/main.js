@@ -17,10 +17,10 @@ for (const input of inputs) {
     inputs[set].ghosts.push(ghost.reversed(input));
   }
 }
-/** How many of the clips that are shown with one come before it. */
+/** The index of a clip among the clips that are drawn together; it selects the clip's colour. */
 const rank = (input) => input.ghosts.filter((ghost) => inputs.indexOf(ghost.input) < inputs.indexOf(input)).length;
 const COLOURS = stored.boxColours;
-// A longer chain is a tangle: its boxes are shown apart until somebody asks for the chain.
+// Chains with more boxes than this are hard to read, so their boxes are shown apart by default.
 const CHAIN = 64;
 const isTangle = (input) => !input.isSkeleton && input.boxes > CHAIN;
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4];
@@ -31,13 +31,13 @@ const state = {
   other: "",
   pairing: "ghost",
   apart: isTangle(inputs[0]),
-  // None until the first result says which moves most.
+  // -1 until the first result is loaded; then the joint that rotates most, or the first box.
   box: -1,
   picked: false,
-  // Pictures between frames are evaluated, too.
+  // Whether times between frames are evaluated and drawn, too.
   between: false,
   hasSkin: true,
-  // Clips that are not drawn. More at once than there are colours would be a crowd: the others wait to be chosen.
+  // Clips that are not drawn. At first these are the clips beyond the number of colours, so that no two have the same.
   hidden: new Set(inputs.filter((input) => rank(input) >= COLOURS.length)),
   time: 0,
   sample: 0,
@@ -46,7 +46,7 @@ const state = {
   speed: 1,
 };
 let results = [];
-// The ghosts that are drawn.
+// The ghosts that are drawn now.
 let ghosts = [];
 let stage = null;
 const plots = new Plots({ components: element("components"), speeds: element("speeds") }, (time) => seek(time));
@@ -61,7 +61,10 @@ function fill(select, entries) {
   );
 }
 
-/** Loads the results asked for and draws everything anew. What the engine refuses is said, and what was written shown. */
+/**
+ * Loads the selected results and redraws everything. If the engine refuses them, shows its error message and goes back to the
+ * first stored method. Calls run one after another: a later selection must not be overwritten by an earlier one.
+ */
 let loading = Promise.resolve();
 function load(refit = false) {
   loading = loading.then(async () => {
@@ -86,7 +89,7 @@ async function redraw(refit) {
   const found = await Promise.all(names.map((name) => input.result(name)));
   const drawn = input.ghosts.filter((ghost) => !state.hidden.has(ghost.input));
   await Promise.all(drawn.map((ghost) => ghost.load(method)));
-  // Together: a picture may be drawn between any two of these.
+  // Assigned together after all awaits, because a frame may be drawn during any await.
   const before = ghosts;
   [results, ghosts] = [found, drawn];
   if (state.box < 0) state.box = input.isSkeleton ? input.busiest(results[0]) : 0;
@@ -102,7 +105,7 @@ async function redraw(refit) {
   show(Math.min(state.sample, input.samples - 1));
 }
 
-/** The clip by its methods, and the ghosts: as scene.js draws them. */
+/** The figures for `Stage.fill`: the clip once for each selected method, then the ghosts. */
 function figures() {
   const { input, apart } = state;
   const colours = ghosts.length > 0 ? [colourOfClip(input)] : COLOURS;
@@ -125,18 +128,18 @@ function figures() {
 }
 
 function complain(message) {
-  if (!stage) return; // why nothing is drawn is said there
+  if (!stage) return; // without WebGL the element shows why nothing is drawn
   element("trouble").hidden = message === "";
   element("trouble").textContent = message;
 }
 
-// The first box is shown until somebody chooses one, which is lit then.
+// Only a box that the user selected is highlighted; the one that is plotted at first is not.
 const picked = () => (state.picked ? state.box : -1);
 const side = () => results.length > 1 && state.pairing === "side";
 const colourOf = (name) => stored.methods.find((method) => method.name === name).colour;
 const colourOfClip = (input) => COLOURS[rank(input) % COLOURS.length];
 
-/** Menus, names and legend as the state is. */
+/** Updates menus, names and legend from the state. */
 function tell() {
   const { input } = state;
   fillMethods();
@@ -179,7 +182,7 @@ function tell() {
   element("floor").textContent = square ? `squares of ${Number(square.toPrecision(1))}` : "";
 }
 
-/** Which clips are drawn: the chosen one and those that can be its ghosts. */
+/** Updates the list of clips: the selected clip and those that can be its ghosts. */
 function tellClips() {
   const { input } = state;
   element("clips").hidden = input.ghosts.length === 0;
@@ -195,7 +198,7 @@ function tellClips() {
   });
 }
 
-/** The methods that this input is shown by: those that were written, then those that the page evaluates. */
+/** Fills the menus of methods: first those that are stored in the page, then those that the page's engine evaluates. */
 function fillMethods() {
   const { methods, written } = state.input;
   const names = methods.join();
@@ -217,10 +220,10 @@ function fillMethods() {
   }
 }
 
-// More marks than this would be a line.
+// More marks than this would merge into a line, so none are drawn.
 const MOST_MARKS = 200;
 
-/** Marks below the slider of time where the keys of the chosen box are. */
+/** Marks the key times of the selected box below the time slider. */
 function markKeys() {
   const { input } = state;
   const { times } = input.keysOf(state.box);
@@ -235,7 +238,7 @@ function drawPlots() {
   plots.now(state.input.times[state.sample] ?? 0);
 }
 
-/** Shows a sample; with a time between it and the next, what the engine makes of that. */
+/** Shows a sample or, for a `time` between this sample and the next, the pose that the engine evaluates there. */
 function show(sample, time = state.input.times[sample]) {
   const { input } = state;
   state.sample = sample;
@@ -264,18 +267,18 @@ function show(sample, time = state.input.times[sample]) {
     (key >= 0 ? `, key ${key + 1} of ${keys}` : "");
   const [x, y, z, w] = rotation(shown[0], input.boxes, at, state.box);
   const turned = `w ${signed(w)}  x ${signed(x)}  y ${signed(y)}  z ${signed(z)}`;
-  // As many digits at every time: those of the whole result.
+  // The number of digits comes from the extent of the whole result, so that it does not change during playback.
   const { positions } = shown[0];
   const place = positions && { positions: { ...positions, size: results[0].positions.size } };
   element("box-values").textContent = turned + (input.isSkeleton ? `, at ${placeInWords(place, input.boxes, at, state.box)}` : "");
 }
 
-/** Matrices of joints where scales are part of what follows these. */
+/** The matrices of the joints, if a skinned mesh needs them because the joints have scales; otherwise undefined. */
 function matrices(input, method, time) {
   return input.skin && input.stored.hasScales && input.live ? input.live.matrices(method, time) : undefined;
 }
 
-/** How far each ghost is from the clip now. */
+/** Updates the text of each ghost: its largest distances from the clip at this time. */
 function tellDistances(moments, own) {
   const { input } = state;
   const turned = (i) => stage && (stage.groups[i].turned ?? []);
@@ -288,7 +291,7 @@ function tellDistances(moments, own) {
   });
 }
 
-/** Shows a time, or the frame that is shown at it. */
+/** Shows a time exactly if times between frames are enabled; otherwise the frame `sample`. */
 function showTime(time, sample) {
   if (state.between && state.input.live) show(state.input.sampleAt(time), time);
   else show(sample);
@@ -296,7 +299,7 @@ function showTime(time, sample) {
 
 const signed = (value) => (value < 0 ? "−" : "+") + Math.abs(value).toFixed(4);
 
-/** Goes to a time, or to the sample nearest to it. */
+/** Goes to a time, or to the nearest sample if times between frames are not evaluated. */
 function seek(time) {
   const { times, samples } = state.input;
   const sample = state.input.nearest(time);
@@ -345,7 +348,7 @@ function advance(seconds) {
   showTime(state.time, state.input.sampleAt(state.time));
 }
 
-/** Frames at another rate, evaluated here; null: those that were written. */
+/** Evaluates frames at another rate in the page; null returns to the stored frames. */
 function setRate(rate) {
   const { input, time } = state;
   if (!input.live) return;
@@ -380,7 +383,7 @@ function setHidden(input, isHidden) {
   load();
 }
 
-/** All ghosts, or none. */
+/** Hides all ghosts if any is visible; otherwise shows all. */
 function toggleGhosts() {
   const others = state.input.ghosts.map((ghost) => ghost.input);
   const isHidden = others.some((other) => !state.hidden.has(other));
@@ -388,7 +391,7 @@ function toggleGhosts() {
 }
 
 function setMethod(name) {
-  if (!state.input.methods.includes(name)) return; // not in this page
+  if (!state.input.methods.includes(name)) return; // the page has no result of it and cannot evaluate it
   state.method = name;
   load();
 }
@@ -396,11 +399,11 @@ function setMethod(name) {
 function setOther(name, pairing = state.pairing) {
   const before = side();
   Object.assign(state, { other: name, pairing });
-  // A ghost needs no other view.
+  // The camera is reset only if the side-by-side layout begins or ends: a ghost takes no more space.
   load(before !== (name !== "" && pairing === "side"));
 }
 
-/** Off, ghost, side by side, off. */
+/** Advances the comparison with a second method: off, ghost, side by side, off. */
 function nextPairing() {
   const names = state.input.methods;
   const other = ["slerp", "bessel-overhauser", ...names].find((name) => name !== state.method && names.includes(name));
@@ -411,7 +414,7 @@ function nextPairing() {
 }
 
 function arrange(apart) {
-  if (state.input.isSkeleton) return; // joints are where they are
+  if (state.input.isSkeleton) return; // the joints of a skeleton are connected and cannot be shown apart
   state.apart = apart;
   load(true);
 }
@@ -438,7 +441,7 @@ function loop(on) {
 }
 
 function setInput(input) {
-  // A ghost becomes the clip at the same moment, with the same joint.
+  // If the new clip was a ghost, the time and the selected joint stay the same.
   const ghost = state.input.ghosts.find((ghost) => ghost.input === input);
   const time = ghost ? state.time + ghost.shift : 0;
   if (ghost && state.picked) state.box = ghost.partner(state.box);
@@ -490,7 +493,7 @@ const KEYS = [
 function pressed(event) {
   if (event.ctrlKey || event.metaKey || event.altKey || element("help").open) return;
   const { target, key } = event;
-  // Menus and fields have keys of their own; a button, space and enter.
+  // Menus and number fields handle all keys themselves, sliders the arrow keys, buttons and check boxes space and enter.
   if (target.matches("select, input[type=number]")) return;
   if (target.matches("input[type=range]") && /^(Arrow|Home|End|Page)/.test(key)) return;
   if (target.matches("button, input[type=checkbox]") && (key === " " || key === "Enter")) return;
@@ -548,7 +551,7 @@ function listen() {
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", dress);
 }
 
-/** The field of one clip: whether it is drawn, its name, and how far it is from the chosen one. */
+/** The list entry of a clip: a check box to draw it, its name, and its distance from the selected clip. */
 function clipField(input) {
   const field = document.createElement("div");
   field.innerHTML =
@@ -591,7 +594,7 @@ async function start() {
   menus();
   listen();
   try {
-    // Where boxes are many, smooth edges cost a browser without a graphics card a third of its speed.
+    // Antialiasing is off for many boxes: in a browser without a graphics card it takes a third of the speed.
     const many = Math.max(...inputs.map((input) => input.boxes)) > 256;
     stage = new Stage(element("stage"), !many);
   } catch (error) {
@@ -605,7 +608,7 @@ async function start() {
   const frame = (now) => {
     const between = now - before;
     before = now;
-    // A page that was hidden goes on where it was.
+    // Browsers draw no frames of a hidden page. Limiting the step to 250 ms continues from the same time afterwards.
     if (state.playing && state.input.times) advance(Math.min(between, 250) / 1000);
     stage?.draw(between);
     requestAnimationFrame(frame);
@@ -613,7 +616,7 @@ async function start() {
   requestAnimationFrame(frame);
 }
 
-// For tests, and for the curious.
+// Access for tests and for the browser's console.
 globalThis.tumble = {
   state,
   seek,

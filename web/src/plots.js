@@ -1,11 +1,11 @@
-// The chosen box's components and angular speed over time, by uPlot.
+// Plots of the selected box over time, by uPlot: quaternion components and angular speed.
 
 import uPlot from "uplot";
 
 const NAMES = ["w", "x", "y", "z"];
-const PLACES = [3, 0, 1, 2]; // of w x y z in x y z w
+const PLACES = [3, 0, 1, 2]; // the indices of w x y z in x y z w
 
-/** One component of a box at every sample; no jump where the sign of a quaternion flips. */
+/** The components w x y z of a box, one array over all samples each. Signs are chosen so that the curves do not jump. */
 function components(result, boxes, box, samples) {
   const columns = NAMES.map(() => new Float64Array(samples));
   const before = [0, 0, 0, 0];
@@ -22,7 +22,7 @@ function components(result, boxes, box, samples) {
   return columns;
 }
 
-/** Keys as values at the samples nearest to them, nothing elsewhere. */
+/** The keys of a box, one array per component: the key's value at the sample nearest to it, null at other samples. */
 function keyDots(set, box, columns) {
   const dots = NAMES.map(() => new Array(set.samples).fill(null));
   const { times, first } = set.keysOf(box);
@@ -53,7 +53,7 @@ export class Plots {
     if (this.time !== undefined) this.now(this.time);
   }
 
-  /** Draws anew: for another box, method or theme. */
+  /** Replaces the plots, after the box, the method or the theme has changed. */
   show(set, results, box, theme) {
     for (const chart of this.charts) chart.destroy();
     const { samples, boxes } = set;
@@ -68,7 +68,7 @@ export class Plots {
       NAMES.forEach((name, i) => series.push(line(`${name}, ${results[1].method}`, colours[i], dashed)));
       data.push(...other);
     }
-    // Keys side by side would hide the curve behind their outlines.
+    // If keys are closer than 8 pixels, the outlines of their dots would cover the curve.
     const dense = set.keysOf(box).times.length > this.width() / 8;
     NAMES.forEach((name, i) => {
       const outlined = { size: 7, stroke: theme.panel, width: 1 };
@@ -118,7 +118,7 @@ export class Plots {
     return chart;
   }
 
-  /** Moves the cursors. */
+  /** Moves the time cursors. */
   now(time) {
     this.time = time;
     for (const chart of this.charts) {

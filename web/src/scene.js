@@ -1,4 +1,4 @@
-// The view, drawn by three.js: boxes, the bones of bones.js, or the bodies of bodies.js.
+// The 3D view, drawn by three.js: boxes (here), bones (bones.js) or bodies on paths (bodies.js), with floor and camera.
 
 import {
   Box3, BoxGeometry, BufferAttribute, BufferGeometry, Color, DirectionalLight, DoubleSide, Euler, GridHelper,
@@ -10,24 +10,24 @@ import { Bodies } from "./bodies.js";
 import { Bones } from "./bones.js";
 import { look } from "./look.js";
 
-// Frames slower than this are drawn with fewer pixels.
+// If frames take longer than this [ms], the pixel ratio is lowered, but not below COARSEST.
 const SLOW = 30;
 const COARSEST = 0.5;
-// Where the camera looks from at first: down and around the upright axis, radians.
+// The initial direction of the camera [rad]: its elevation, and its azimuth about the vertical axis.
 const DOWN = 0.3;
 const AROUND = 0.4;
-// With ground in it, more from above.
+// The elevation if the scene has a ground mesh, which is easier to read from above.
 const DOWN_ON_GROUND = 0.6;
-// The colours of the ground and of what stands on it.
+// The colours of the ground mesh and of obstacles on it.
 const GROUND = 0xa9c28f;
 const OBSTACLE = 0x9c9690;
 
-/** Where the boxes of one result stand at a sample. */
+/** The boxes of a clip without a skeleton; `place` moves them to a sample of a result. */
 class Boxes {
   constructor(count, length, colours, ghost) {
     const breadth = length * 0.28;
     const geometry = new BoxGeometry(breadth, length * 0.96, breadth);
-    geometry.translate(0, -length / 2, 0); // it hangs from the origin
+    geometry.translate(0, -length / 2, 0); // the pivot is the top end of the box
     const material = new MeshLambertMaterial(look(ghost));
     this.mesh = new InstancedMesh(geometry, material, count);
     this.mesh.frustumCulled = false;
@@ -38,7 +38,7 @@ class Boxes {
     this.paint(-1);
   }
 
-  /** Colours the boxes; the chosen one (-1: none) is lighter. */
+  /** Colours the boxes; the selected one is lighter (`chosen`: its index, -1 for none). */
   paint(chosen) {
     const colour = new Color();
     for (let box = 0; box < this.mesh.count; box++) {
@@ -49,7 +49,7 @@ class Boxes {
     this.mesh.instanceColor.needsUpdate = true;
   }
 
-  /** Box i hangs at the end of box i-1, turned in its frame; or each in a place of its own. */
+  /** As a chain, box i is attached to the end of box i-1 and rotates relative to it. If `apart`, each has a cell of a grid. */
   place(result, sample, { apart, shift }) {
     const count = this.mesh.count;
     const matrices = this.mesh.instanceMatrix.array;
@@ -74,7 +74,7 @@ class Boxes {
     this.mesh.instanceMatrix.needsUpdate = true;
   }
 
-  /** Every place that ends of boxes take at some samples. */
+  /** The positions of both ends of all boxes at about 60 samples, for the bounding box of the view. */
   points(result, samples, apart) {
     const points = [];
     const matrix = new Matrix4();
@@ -89,7 +89,7 @@ class Boxes {
     return points;
   }
 
-  /** The rotation that a box shows, seen from the box it hangs from: read back from what is drawn. */
+  /** The rotation x y z w of a box relative to the box before it, read from the mesh: tests check the picture with it. */
   shown(box, apart) {
     const world = new Quaternion();
     const parent = new Quaternion();
@@ -110,7 +110,7 @@ class Boxes {
   }
 }
 
-/** Places side by side, in rows. */
+/** The position of a box in a grid in the plane y = 0, for boxes that are shown apart. */
 function cell(box, count, length) {
   const columns = Math.ceil(Math.sqrt(count));
   const x = (box % columns) - (columns - 1) / 2;
@@ -151,7 +151,7 @@ export class Stage {
     this.stale = true;
   }
 
-  /** The ground, and what stands on it: meshes of data.js. */
+  /** Adds the ground mesh (the first) and the obstacles (the others); `mesh` in data.js unpacks them. */
   stand(meshes) {
     this.ground = meshes.map(({ places, triangles }, i) => {
       const geometry = new BufferGeometry();
@@ -165,9 +165,9 @@ export class Stage {
   }
 
   /**
-   * New boxes, bones or bodies, a group for each figure: its clip and its result, its colours, whether it is a ghost and
-   * whether its boxes stand apart, on which side it stands (-1, 0, 1), how far its origin is from that of the first
-   * (`offset`), and which of its joints is the same as one of the first (`partner`).
+   * Replaces all groups (boxes, bones or bodies), one for each figure. A figure has a clip (`input`), its `result`,
+   * `colours`, `isGhost`, `apart` (boxes in a grid instead of a chain), `side` (-1 left, 0 middle, 1 right), `offset` (its
+   * origin minus that of the first figure) and `partner` (maps a joint of the first figure to this figure's).
    */
   fill(figures) {
     for (const group of this.groups ?? []) {
@@ -194,7 +194,7 @@ export class Stage {
     this.stale = true;
   }
 
-  /** Each figure at a sample of a result, `moments[i]`; nothing of one that has no moment, or is hidden. */
+  /** Draws figure i at `moments[i]`, {result, sample, matrices, isHidden}. It is invisible if this is null or hidden. */
   place(moments, { hasSkin }) {
     this.groups.forEach((group, i) => {
       const [moment, { apart, side }] = [moments[i], this.figures[i]];
@@ -206,7 +206,7 @@ export class Stage {
     this.stale = true;
   }
 
-  /** How much room all of it takes. */
+  /** Computes the bounding box of all figures and the ground, and the distance between figures side by side. */
   measure() {
     this.points = this.groups.flatMap((group, i) => {
       const { input, result, apart } = this.figures[i];
@@ -222,11 +222,11 @@ export class Stage {
     }
     this.room = this.extent.clone().expandByScalar(group.length * 0.2);
     const size = this.room.getSize(new Vector3());
-    // Long skeletons side by side would hide each other: the camera looks past them at an angle.
+    // The camera looks at an angle, so skeletons that move far along z would cover each other without this extra distance.
     this.span = size.x + (this.hasSquares ? size.z * Math.tan(AROUND) : 0) + group.length * 0.5;
   }
 
-  /** The floor under it, and the camera where it sees everything. */
+  /** Fits the floor and the camera to the bounding box. */
   frame(side) {
     const { min, max } = this.room;
     const centre = this.room.getCenter(new Vector3());
@@ -261,7 +261,10 @@ export class Stage {
     this.stale = true;
   }
 
-  /** A floor for joints: squares of 1, 2 or 5 times a power of ten units, at multiples of that, under all places. */
+  /**
+   * The floor under skeletons, at the lowest position. Its squares are 1, 2 or 5 times a power of ten, and its lines are at
+   * multiples of that, so that distances can be read.
+   */
   layOut(side) {
     const { min, max } = this.extent;
     const aside = side ? this.span / 2 : 0;
@@ -270,18 +273,18 @@ export class Stage {
     this.square = [1, 2, 5, 10].map((times) => times * power).find((square) => square >= across / 8);
     const middle = (low, high) => Math.round((low + high) / 2 / this.square) * this.square;
     this.floorPlace = new Vector3(middle(min.x, max.x), min.y, middle(min.z, max.z));
-    // Two squares more to each side than half of it: the middle is off by up to half a square.
+    // Two extra squares on each side, because the centre of the grid was rounded to a multiple of a square.
     this.floorSquares = 2 * (Math.ceil(across / 2 / this.square) + 2);
     this.floorSize = this.floorSquares * this.square;
   }
 
-  /** The grid, in the colours of the theme. */
+  /** Creates the grid of the floor in the colours of the theme. */
   layFloor() {
     if (this.floor) {
       this.scene.remove(this.floor);
       this.floor.dispose();
     }
-    // The lines through the middle stand out where the middle means something.
+    // The centre lines are emphasised only under boxes and bodies; under skeletons the centre is no special position.
     const lines = this.hasSquares ? [this.lines[1], this.lines[1]] : this.lines;
     this.floor = new GridHelper(this.floorSize, this.floorSquares, ...lines);
     this.floor.position.copy(this.floorPlace);
@@ -297,7 +300,7 @@ export class Stage {
     this.stale = true;
   }
 
-  /** Turns the view by angles about the upright and the level axis, radians. */
+  /** Rotates the camera about its target [rad]: `around` the vertical axis, `over` a horizontal axis. */
   turn(around, over) {
     const { target } = this.controls;
     const offset = this.camera.position.clone().sub(target);
@@ -317,7 +320,7 @@ export class Stage {
     this.stale = true;
   }
 
-  /** The box or joint at a point of the page, or -1. */
+  /** The index of the box or joint at a point of the page, x y in CSS pixels; -1 if there is none. */
   pick(x, y) {
     const area = this.renderer.domElement.getBoundingClientRect();
     const point = new Vector2(((x - area.left) / area.width) * 2 - 1, 1 - ((y - area.top) / area.height) * 2);
@@ -332,13 +335,13 @@ export class Stage {
     return hit.object.userData.joints?.[hit.instanceId] ?? hit.instanceId;
   }
 
-  /** How many boxes, bones, curves and axes stand in the scene. */
+  /** The number of visible instances (boxes, bones, pieces of curves, axes) in each mesh of each figure, for tests. */
   inView() {
     const count = (object) => (object.visible ? (object.count ?? 0) : 0);
     return this.groups.map(({ object }) => (object.visible ? object.children.map(count) : []));
   }
 
-  /** Draws if anything has changed; where that takes long, with fewer pixels from then on. */
+  /** Draws if anything has changed. After 12 slow frames in a row, the pixel ratio is lowered. `between`: ms since the last call. */
   draw(between) {
     this.controls.update();
     if (!this.stale) return;

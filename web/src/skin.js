@@ -1,18 +1,18 @@
-// Meshes that follow the joints, drawn by three.js around the bones.
+// Skinned meshes, drawn translucent around the bones by three.js.
 
 import {
   Bone, BufferAttribute, BufferGeometry, DoubleSide, Matrix4, MeshLambertMaterial, Quaternion, Skeleton, SkinnedMesh,
   Vector3,
 } from "three";
 
-// Bones are seen through it.
+// Translucent, so that the bones inside remain visible.
 const OPACITY = 0.4;
 const COLOUR = 0x9aa3ad;
-// Vertices that say how much room it takes.
+// The number of vertices that are used for the bounding box of the view.
 const MEASURED = 300;
 
 export class Skin {
-  /** `ghostColour`: where it is one. */
+  /** `ghostColour`: the colour if the mesh belongs to a ghost; otherwise null. */
   constructor({ places, triangles, bonesOf, weights, joints, toJoints }, ghostColour) {
     const geometry = new BufferGeometry();
     geometry.setAttribute("position", new BufferAttribute(places, 3));
@@ -25,7 +25,7 @@ export class Skin {
     this.joints = joints;
     this.bones = joints.map(() => {
       const bone = new Bone();
-      // Their matrices are the engine's.
+      // `follow` sets the world matrices, so three.js must not recompute them from positions and rotations.
       bone.matrixAutoUpdate = false;
       bone.matrixWorldAutoUpdate = false;
       return bone;
@@ -35,11 +35,11 @@ export class Skin {
     this.mesh.bindMode = "detached";
     this.mesh.bind(new Skeleton(this.bones, inverses), new Matrix4());
     this.mesh.frustumCulled = false;
-    // Behind what is inside it.
+    // Draw after the bones inside: a translucent mesh drawn first would hide them.
     this.mesh.renderOrder = 1;
   }
 
-  /** Follows joints: by their matrices, 16 numbers each, or by where they are and how they are turned. */
+  /** Moves the mesh with the joints: by their matrices (16 numbers each), or by world positions and rotations. */
   follow({ matrices, places, turned }, shift) {
     const one = new Vector3(1, 1, 1);
     this.bones.forEach((bone, i) => {
@@ -51,7 +51,7 @@ export class Skin {
     this.mesh.skeleton.update();
   }
 
-  /** Where some of its vertices are now. */
+  /** The current positions of about 300 vertices. */
   points() {
     const count = this.mesh.geometry.attributes.position.count;
     const step = Math.max(1, Math.floor(count / MEASURED));
@@ -60,7 +60,7 @@ export class Skin {
     return points;
   }
 
-  /** Where a vertex is now. */
+  /** The current position of a vertex. */
   vertex(vertex) {
     const at = new Vector3().fromBufferAttribute(this.mesh.geometry.attributes.position, vertex);
     return this.mesh.applyBoneTransform(vertex, at);

@@ -1,11 +1,11 @@
-// Light and dark.
+// The light and the dark theme.
 
-/** The colours of the page as they are now, and those of the methods. */
+/** The current colours of the page, and the colour of each method. */
 export function colours(methods) {
   const style = getComputedStyle(document.documentElement);
   const probe = document.createElement("i");
   document.body.append(probe);
-  // The colour that light-dark() chooses.
+  // Assigning the variable to an element resolves light-dark() to the colour of the current theme.
   const value = (name) => {
     probe.style.color = style.getPropertyValue(`--${name}`);
     return getComputedStyle(probe).color;
@@ -17,7 +17,7 @@ export function colours(methods) {
   return theme;
 }
 
-/** From light to dark, and back. */
+/** Switches between the light and the dark theme. */
 export function switchTheme() {
   const root = document.documentElement;
   const dark = matchMedia("(prefers-color-scheme: dark)").matches;

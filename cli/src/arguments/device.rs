@@ -34,8 +34,8 @@ pub(crate) fn stream_chunk(layout: Layout, tracks: usize) -> usize {
 pub(crate) struct DeviceArguments {
     /// The device: auto (the CPU for fewer than 2^20 rotations, else the CPU or a graphics card, whichever is
     /// faster in a short measurement), first (the first Vulkan device that gives the CPU's bits, else the CPU),
-    /// cpu, vulkan, or a device by its index, part of its name or uuid:UUID (`tumble devices`). All give the
-    /// same bits
+    /// cpu, vulkan or gpu (the first Vulkan device that gives the CPU's bits, which may be a software driver), or a
+    /// device by its index, part of its name or uuid:UUID (`tumble devices`). All give the same bits
     #[arg(long, value_name = "DEVICE", default_value = "auto")]
     device: DeviceChoice,
     /// Use the device that --device names although its self-tests fail: its bits may differ from
@@ -499,7 +499,9 @@ fn by_uuid(requested: &str, uuid: &str, devices: &[Device]) -> Result<Device, Fa
 fn listing(devices: &[Device]) -> Vec<String> {
     let lines = devices.iter().enumerate();
     let lines = lines.map(|(index, device)| format!("  {index}  {}", device.name()));
-    std::iter::once("  there are: auto, first, cpu, vulkan, and".to_owned())
-        .chain(lines)
-        .collect()
+    std::iter::once(
+        "  names: auto, first, cpu, vulkan (or gpu); devices by index or name:".to_owned(),
+    )
+    .chain(lines)
+    .collect()
 }

@@ -36,8 +36,8 @@ pub(crate) struct Inputs {
     /// With --files-from: the inputs in the list end in NUL characters, as `find -print0` writes them, instead of line ends
     #[arg(short = '0', long, requires = "files_from")]
     null: bool,
-    /// Leave out files and folders whose names match a pattern, such as '*_draft.bvh', or 'takes/old' for names
-    /// that follow each other in a path; may be given several times
+    /// Leave out files and folders whose names match a pattern, such as '*_draft.bvh', or a part of a path such
+    /// as 'takes/old'; may be given several times
     #[arg(long, value_name = "PATTERN", value_parser = PathPattern::new)]
     exclude: Vec<PathPattern>,
     /// Read named pipes too
@@ -46,7 +46,7 @@ pub(crate) struct Inputs {
     /// The largest input to read
     #[arg(long, value_name = "SIZE", default_value = "16GiB", value_parser = words::parse_bytes)]
     max_size: u64,
-    /// The memory limit for reading an input, besides the input itself [default: 64 times its length
+    /// The memory limit for reading an input, not counting the input itself [default: 64 times its length
     /// plus 64MiB]
     #[arg(long, value_name = "SIZE", value_parser = words::parse_bytes)]
     max_memory: Option<u64>,
@@ -455,6 +455,8 @@ struct Expansion {
     found: Vec<FoundInput>,
     /// The inputs that `--exclude` leaves out. Directories count theirs only if none is left.
     excluded: usize,
+    /// The path is a pattern that no file matches.
+    is_unmatched: bool,
 }
 
 /// One input file, and its path below a directory of results.
@@ -541,6 +543,7 @@ impl GatheredInputs {
         let mut seen: HashMap<PathBuf, usize> = HashMap::new();
         let mut repeated: Vec<(usize, FoundInput)> = Vec::new();
         let mut excluded = 0;
+        let mut unmatched: Vec<String> = Vec::new();
         let exclusions = Exclusions::new(selection.exclude);
         let named = paths.iter().map(|path| NamedPath {
             path,
@@ -553,6 +556,9 @@ impl GatheredInputs {
         for NamedPath { path, is_listed } in named.chain(listed) {
             let expansion = gathered.expand(path, selection, &exclusions);
             excluded += expansion.excluded;
+            if expansion.is_unmatched {
+                unmatched.push(names::input(path));
+            }
             for mut found in expansion.found {
                 // The results of a list have the same directory tree as the list.
                 if is_listed && let Some(below) = plain(&found.path) {
@@ -571,6 +577,11 @@ impl GatheredInputs {
                     }
                 }
             }
+        }
+        // Said here, because a command checks its output before it opens its inputs.
+        if !unmatched.is_empty() && unmatched.len() >= gathered.files.len() {
+            let message = format!("{}: no file matches this pattern", unmatched.join(", "));
+            return Err(Failure::new(exit::ALL_INPUTS, message));
         }
         gathered.settle(repeated);
         gathered.unread.note();
@@ -607,7 +618,9 @@ impl GatheredInputs {
             if index < LISTED {
                 let [name, kept] = [&found.path, &kept.path].map(|path| names::input(path));
                 words::warning(&match name == kept {
-                    true => format!("{name}: named twice; it is processed once"),
+                    true => format!(
+                        "{name}: named twice (by itself, a directory or a pattern); it is processed once"
+                    ),
                     false => {
                         format!("{name}: is the same file as {kept}, and is processed once")
                     }
@@ -639,7 +652,7 @@ impl GatheredInputs {
         if names::is_standard(path) {
             return Expansion {
                 found: alone(),
-                excluded: 0,
+                ..Expansion::default()
             };
         }
         if path.is_dir() {
@@ -652,17 +665,23 @@ impl GatheredInputs {
                 // The error is reported when the file is opened.
                 return Expansion {
                     found: alone(),
-                    excluded,
+                    ..Expansion::default()
                 };
             }
             self.many = true;
-            return Expansion { found, excluded };
+            return Expansion {
+                found,
+                excluded,
+                is_unmatched: false,
+            };
         }
         let matching = match path.is_file() {
             true => Vec::new(),
             false => matches(path),
         };
         self.many |= !matching.is_empty();
+        let is_unmatched =
+            matching.is_empty() && !path.exists() && path.to_str().is_some_and(is_pattern);
         // A file that does not exist is reported when it is opened.
         let all = match matching.is_empty() {
             true => alone(),
@@ -675,6 +694,7 @@ impl GatheredInputs {
         let found: Vec<FoundInput> = left.collect();
         Expansion {
             excluded: count - found.len(),
+            is_unmatched: is_unmatched && !found.is_empty(),
             found,
         }
     }

@@ -164,7 +164,7 @@ pub(crate) fn ends() -> impl TypedValueParser<Value = Ends> {
         Ends::Clamped { .. } => "start and end at rest",
         Ends::Secant => "the mean velocity between the last two keys or points",
         Ends::Loop => "a closed curve: the last key or point equals the first",
-        Ends::Frozen => "the first and the last segment stand still",
+        Ends::Frozen => "no motion in the first and in the last interval",
         other => other.name(),
     };
     one_of(Ends::ALL.map(|ends| (ends.name(), help(ends), ends)))
@@ -212,9 +212,9 @@ pub(crate) fn of_outside(error: OutsideError, name: &str) -> Failure {
 
 fn outside() -> impl TypedValueParser<Value = OutsideValue> {
     let help = |mode: WrapMode| match mode {
-        WrapMode::Hold => "the end value",
+        WrapMode::Hold => "the first or the last value is held",
         WrapMode::Loop => "the track repeats",
-        WrapMode::Mirror => "the track runs backwards and forwards in turn",
+        WrapMode::Mirror => "the track runs forwards and backwards alternately (ping-pong)",
         WrapMode::Extrapolate => "continues at the velocity of the end",
         other => other.name(),
     };
@@ -231,7 +231,9 @@ fn outside() -> impl TypedValueParser<Value = OutsideValue> {
 fn key_signs() -> impl TypedValueParser<Value = KeySigns> {
     let help = |signs| match signs {
         KeySigns::Shortest => "the shorter rotation (default)",
-        KeySigns::AsAuthored => "as the signs of the keys say",
+        KeySigns::AsAuthored => {
+            "as the signs of the keys state, since q and -q differ: possibly the longer rotation"
+        }
     };
     one_of(KeySigns::ALL.map(|signs| (signs.name(), help(signs), signs)))
 }

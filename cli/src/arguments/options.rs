@@ -240,7 +240,7 @@ pub(crate) const OPTIONS: &[OptionRule] = &[
     of_results("root_motion", root_motion),
     deciding("heading"),
     deciding("root_joint"),
-    // Other skeletons.
+    // Options of retargeting.
     OptionRule {
         bytes: Bytes::ByContent,
         ..deciding("onto")

@@ -149,8 +149,8 @@ fn axes() -> impl TypedValueParser<Value = Axes> {
 /// Parses the name of an order of a quaternion's components.
 pub(crate) fn component_order() -> impl TypedValueParser<Value = ComponentOrder> {
     let help = |order| match order {
-        ComponentOrder::Xyzw => "as in memory, glTF and SciPy",
-        ComponentOrder::Wxyz => "as in .dat files",
+        ComponentOrder::Xyzw => "as in glTF, SciPy and ROS",
+        ComponentOrder::Wxyz => "as in .dat files and MuJoCo",
     };
     one_of(ComponentOrder::ALL.map(|order| (order.name(), help(order), order)))
 }

@@ -56,7 +56,7 @@ pub(crate) struct PathArguments {
     /// Ignore the upward directions of a file (ux, uy, uz): only minimal frames use them
     #[arg(long)]
     no_ups: bool,
-    /// What to do with the remaining rotation about the direction at the end of a closed path
+    /// Whether the roll that is left at the end of a closed path is spread over the path or stays at its end
     #[arg(long, value_name = "TWIST", default_value_t, value_parser = twist())]
     twist: Twist,
     /// The speed along the curve: as-keyed, constant, or eased:A,B, which speeds up over the fraction A of the

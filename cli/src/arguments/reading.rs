@@ -41,7 +41,7 @@ pub(crate) struct ReadingArguments {
     /// The frame rate of the keys of files that state neither times nor a rate
     #[arg(long, value_name = "FPS")]
     source_fps: Option<FrameRate>,
-    /// The frame rate of the keys of files without times, instead of the one that they state
+    /// The frame rate of the keys of files that store no times, in place of the rate that such a file states (BVH, NPZ)
     #[arg(long, value_name = "FPS", conflicts_with = "source_fps")]
     override_fps: Option<FrameRate>,
     /// The key times of files without times (KITTI): a file of seconds, one line for each pose
@@ -127,7 +127,7 @@ enum DuplicatesArgument {
     First,
     /// the last of them
     Last,
-    /// both, as a jump: the first key is moved to one step of f32 before its time
+    /// both, as a jump: the first key is moved earlier by the smallest step of f32
     Both,
 }
 

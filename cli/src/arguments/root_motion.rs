@@ -39,7 +39,7 @@ pub(crate) struct RootMotionArguments {
     /// How the heading of the root is defined
     #[arg(long, value_name = "HEADING", requires = "root_motion", default_value_t, value_parser = heading())]
     heading: HeadingSource,
-    /// The joint that is the root [default: the one that moves, and whose ancestors do not]
+    /// The name of the root joint [default: the topmost joint that moves]
     #[arg(long, value_name = "NAME", requires = "root_motion")]
     root_joint: Option<String>,
     #[command(flatten)]

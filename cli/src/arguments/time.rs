@@ -34,7 +34,7 @@ const BROADCAST_TOLERANCE: f64 = 2e-4;
 
 #[derive(Debug, Clone, Args)]
 pub(crate) struct SamplingArguments {
-    /// Frames per second: from the first key to the last, a number, a ratio, such as 30000/1001, or `source`, the rate
+    /// Frames per second, from the first key to the last: a number, a ratio such as 30000/1001, or `source`, the rate
     /// of the input's keys (25 if they have no rate, or a rate below 10)
     #[arg(
         short = 'f',
@@ -150,10 +150,10 @@ pub(crate) struct KeyTimes {
 /// `--max-gap`: between which keys a clip is not interpolated.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct GapArguments {
-    /// The longest gap, seconds: keys that are further apart are not interpolated
+    /// Do not interpolate between keys that are more than SECONDS apart
     #[arg(long, value_name = "SECONDS", value_parser = not_negative)]
     max_gap: Option<f64>,
-    /// What to do with times in such gaps
+    /// What to do with times between keys that are more than --max-gap apart
     #[arg(long, value_enum, requires = "max_gap", default_value = "leave-out")]
     in_gaps: InGaps,
 }
@@ -346,7 +346,7 @@ impl SamplingArguments {
             && let Some(meant) = broadcast_rate(rate)
         {
             words::warning(&format!(
-                "{} frames per second is taken as written; the broadcast rate is {meant}",
+                "exactly {} frames per second is used; for the broadcast (NTSC) rate write {meant}",
                 rate.per_second()
             ));
         }
@@ -568,8 +568,8 @@ fn warn_outside_keys(start: f64, end: f64, clip: &Motion, outside: Outside, name
         let [start, end, first, last] =
             [start, end, first, last].map(|time| time + clip.time_offset as f64);
         words::warning(&format!(
-            "{name}: asked for {start} to {end} s, keys lie from {first} to {last} s; \
-             --before and --after select the values outside them (by default the first and the last key)"
+            "{name}: the times from {start} to {end} s exceed the keys, {first} to {last} s; outside them the first or \
+             the last key is held (--before and --after select other values)"
         ));
     }
 }

@@ -191,7 +191,7 @@ impl TrackArguments {
                 .map(|&track| clip.set.track_name(track))
                 .collect();
             words::note(&format!(
-                "{name}: the parents of these tracks are kept as well: {}",
+                "{name}: also kept, as parents of the selected tracks: {}",
                 more.join(", ")
             ));
         }

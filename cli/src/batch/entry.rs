@@ -232,9 +232,12 @@ impl ManifestEntry {
 
     /// As [`ManifestEntry::is_made_from`], of any input.
     pub(crate) fn is_made_with(&self, options: &str) -> bool {
-        self.options == options
-            && self.kernels_sha256 == kernels_sha256()
-            && self.tumble == env!("CARGO_PKG_VERSION")
+        self.options == options && self.is_of_this_program()
+    }
+
+    /// Whether a program of this version with the same kernels made it.
+    pub(crate) fn is_of_this_program(&self) -> bool {
+        self.kernels_sha256 == kernels_sha256() && self.tumble == env!("CARGO_PKG_VERSION")
     }
 }
 
@@ -353,7 +356,7 @@ impl ManifestLines {
         UnfinishedInputs { failed, pending }
     }
 
-    /// The results of inputs that failed, at least in part, or that no batch has come to.
+    /// The results of inputs that failed, at least in part, or that no batch has processed yet.
     pub(crate) fn unfinished(&self) -> BTreeSet<String> {
         self.inputs.keys().cloned().collect()
     }
@@ -462,7 +465,7 @@ pub(crate) trait ResultRecorder {
 pub(crate) struct PreviousEntries {
     pub(super) folder: PathBuf,
     pub(super) entries: Arc<BTreeMap<String, ManifestEntry>>,
-    /// The results of inputs that failed, at least in part, or that no batch has come to.
+    /// The results of inputs that failed, at least in part, or that no batch has processed yet.
     pub(super) unfinished: Arc<BTreeSet<String>>,
 }
 

@@ -49,7 +49,7 @@ pub(crate) struct Manifest {
     prune: bool,
     /// Whether there is a file of its name: a manifest, or a file to replace.
     exists: bool,
-    /// The file that lines are appended to; `None` before the first.
+    /// The file to which lines are appended; `None` before the first line is written.
     journal: Option<File>,
     /// Whether there are shards, whose lines become part of it.
     has_shards: bool,

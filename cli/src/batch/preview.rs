@@ -189,8 +189,22 @@ fn of_one_file(
 
 const REPLACED: &str = "replaces a file";
 
-const MADE_AGAIN: &str =
-    "made again: its input, an option or the program differs, or it is damaged";
+/// Which options differ between the texts of two requests, such as `option --fps`.
+fn changed_options(recorded: &str, current: &str) -> String {
+    let entries = |text: &str| -> BTreeSet<String> { text.split(' ').map(str::to_owned).collect() };
+    let (recorded, current) = (entries(recorded), entries(current));
+    let changed = recorded.symmetric_difference(&current);
+    let names = changed.filter_map(|entry| entry.split_once('=').map(|(name, _)| name));
+    let names: BTreeSet<String> = names
+        .map(|name| format!("--{}", name.replace('_', "-")))
+        .collect();
+    let names: Vec<String> = names.into_iter().collect();
+    match names.len() {
+        0 => "an option".to_owned(),
+        1 => format!("option {}", names[0]),
+        _ => format!("options {}", names.join(", ")),
+    }
+}
 
 /// For each result of inputs that failed in the last run, at least in part: why it is made again.
 fn failed_before(lines: &ManifestLines) -> BTreeMap<String, String> {
@@ -316,11 +330,11 @@ impl<'a> PreviewedFolder<'a> {
         for (animation, output) in results {
             let whole = self.out.join(&output);
             let exists = std::fs::symlink_metadata(&whole).is_ok();
-            let is_known = resume && self.previous.entries().contains_key(&output);
-            let reason: Option<Cow<'static, str>> = match self.failed.get(name) {
-                Some(reason) if resume => Some(reason.clone().into()),
+            let known = self.previous.entries().get(&output);
+            let reason: Option<Cow<'static, str>> = match (self.failed.get(name), known) {
+                (Some(reason), _) if resume => Some(reason.clone().into()),
                 _ if !exists => None,
-                _ if is_known => Some(MADE_AGAIN.into()),
+                (_, Some(entry)) if resume => Some(self.why_made_again(entry, path).into()),
                 _ => Some(REPLACED.into()),
             };
             self.preview.results.push(PreviewedResult {
@@ -345,6 +359,31 @@ impl<'a> PreviewedFolder<'a> {
         let options = &self.work.options.text;
         hash_before_reading(&file, limits)
             .is_some_and(|hash| self.previous.is_done(name, hash, options))
+    }
+
+    /// The differences between the recorded request of a result and the present one.
+    fn why_made_again(&self, entry: &ManifestEntry, path: &Path) -> String {
+        let limits = self.work.reader.limits();
+        let file = InputFile::within(path, limits);
+        let options = &self.work.options.text;
+        let mut changed = Vec::new();
+        if entry.input_sha256.as_deref() != hash_before_reading(&file, limits) {
+            changed.push("its input".to_owned());
+        }
+        if entry.options != *options {
+            changed.push(changed_options(&entry.options, options));
+        }
+        if !entry.is_of_this_program() {
+            changed.push("the program".to_owned());
+        }
+        if !changed.is_empty() {
+            return format!("made again: {} changed", changed.join(", "));
+        }
+        let (bytes, sha256) = (entry.output_bytes, &entry.output_sha256);
+        match digest::is_whole(self.out, &entry.output, bytes, sha256) {
+            Ok(true) => "made again: not all results of its input are complete".to_owned(),
+            _ => "made again: its file was changed or damaged".to_owned(),
+        }
     }
 
     /// Adds the results that `--prune` would remove.

@@ -34,9 +34,9 @@ pub(crate) struct BatchSummary {
     printed: BTreeSet<Option<Code>>,
     /// How many lines were left out.
     left_out: usize,
-    /// The results whose lines were left out, and which have a rate that was assumed: how many, and the first rate.
+    /// Results with an assumed rate whose lines were not printed: their number, and the first rate.
     assumed: Option<(usize, String)>,
-    /// The failed inputs that have results of an earlier run: how many, and the first of these results.
+    /// Failed inputs that have results of an earlier run: their number, and the first of these results.
     stale: Option<(usize, String)>,
 }
 

@@ -61,7 +61,7 @@ pub(crate) fn of(path: &Path) -> Option<&'static Format> {
     Format::of(path).filter(|format| format.is_writable())
 }
 
-/// The extensions of results, each as `show` has it.
+/// The extensions of all formats that can be written, each formatted by `show`.
 pub(super) fn extensions(show: impl Fn(&str) -> String) -> Vec<String> {
     Format::writable().map(|format| show(format.name)).collect()
 }

@@ -36,7 +36,7 @@ use crate::messages::words;
 #[command(after_help = "\
 The result is an NPZ file with arrays of f32 for all frames and joints in the world, the times and the \
 names of the joints. With --robot the joints are the robot's bodies, and velocities are derivatives of the \
-curves; for other skeletons they are differences over 1/32 of a frame. HumanML3D needs metres, y \
+curves; for other skeletons they are differences of poses 1/32 of a frame apart. HumanML3D needs metres, y \
 up, 20 frames a second and the 22 joints of SMPL, or of a skeleton that is recognised by its names; bodies of SMPL need \
 --body-model.
 
@@ -92,9 +92,9 @@ fn sets() -> impl TypedValueParser<Value = FeatureSet> {
 
 fn mirror_axis() -> impl TypedValueParser<Value = usize> {
     one_of([
-        ("x", "people with y up, who face z", 0),
-        ("y", "robots with z up, which face x", 1),
-        ("z", "people who face x", 2),
+        ("x", "for y-up skeletons of people that face z", 0),
+        ("y", "for z-up robots that face x", 1),
+        ("z", "for skeletons of people that face x", 2),
     ])
 }
 

@@ -231,7 +231,7 @@ impl ClipReport {
         }
     }
 
-    /// `22 joints of 24, hips × 0.0112, hands and feet within 4 % of the height`.
+    /// `22 of 24 joints are mapped, translations of the hips × 0.0112, hands and feet within 4 % of the hips' height`.
     fn text(&self) -> String {
         let joints = self.pairs.len() + self.resting.len();
         let ends = self.ends.values().filter_map(serde_json::Value::as_f64);
@@ -241,7 +241,7 @@ impl ClipReport {
         });
         let scale = self.scale;
         format!(
-            "{} of {joints} joints follow, hips × {scale:.4}{furthest}",
+            "{} of {joints} joints are mapped, translations of the hips × {scale:.4}{furthest}",
             self.pairs.len()
         )
     }

@@ -29,7 +29,8 @@ use crate::messages::{listing, names, words};
 Every rotation of every frame is computed three times: on the device, by the engine on the CPU, and by \
 a textbook implementation in f64. The bits of the first two must be equal, and the error against the \
 third must be within a bound. Velocities, accelerations and every encoding are compared in the same \
-way. The exit code is 8 if a comparison fails. By default the device is the first Vulkan device. If \
+way. The exit code is 8 if a comparison fails. Without --device, the device is the first Vulkan device, \
+of whatever number of rotations (not `auto`, as in other commands). If \
 there is none, only the CPU is compared with f64, and the exit code is 5. With --device cpu this \
 comparison is enough, and the exit code is 0.
 
@@ -119,7 +120,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let failing = lines.iter().filter(is_failed).count();
     if arguments.json {
         listing::records(&lines, &failed)?;
-    } else {
+    } else if !lines.is_empty() {
         listing::text(&report(&lines, &device))?;
     }
     if failing > 0 {
@@ -130,8 +131,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         return Err(Failure::new(DIFFERENCE, message));
     }
     if !device.is_vulkan() && !arguments.device.is_cpu() {
-        let message = "no Vulkan device took part: the CPU was compared with the f64 reference alone \
-                       (--device cpu asks for that)";
+        let message = "no Vulkan device was compared, only the CPU with the f64 reference; --device cpu \
+                       selects this comparison alone";
         return outcome.and(Err(Failure::new(NO_VULKAN, message)));
     }
     outcome

@@ -364,8 +364,7 @@ impl FailedInputs {
                 format!("{failed} of {total} inputs failed (and {in_part} in part)")
             }
         };
-        let message = format!("{failures}; the others did not");
-        Err(Failure::new(SOME_INPUTS, message))
+        Err(Failure::new(SOME_INPUTS, failures))
     }
 }
 

@@ -135,7 +135,7 @@ impl Progress {
             "seconds": seconds,
             "seconds_left": seconds_left,
         });
-        // If the reader of the output has ended, the work continues.
+        // A failed write is ignored: if standard error is closed, the work continues.
         let _ = writeln!(std::io::stderr(), "{line}");
     }
 }

@@ -237,6 +237,22 @@ pub(crate) fn nearest<'a>(
         .map(|(_, name)| name)
 }
 
+/// A parser of whole numbers from `minimum` to `maximum`. The message of clap's parser shows the range in Rust's syntax.
+pub(crate) fn whole_number<T>(
+    minimum: u64,
+    maximum: u64,
+) -> impl Fn(&str) -> Result<T, String> + Clone + Send + Sync + 'static
+where
+    T: TryFrom<u64> + 'static,
+{
+    move |text: &str| {
+        let number: Option<u64> = text.parse().ok();
+        let number = number.filter(|number| (minimum..=maximum).contains(number));
+        let found = number.and_then(|number| T::try_from(number).ok());
+        found.ok_or_else(|| format!("give a whole number from {minimum} to {maximum}"))
+    }
+}
+
 /// `256MiB`, `1.5 GB`, `1000000`: bytes.
 pub(crate) fn parse_bytes(text: &str) -> Result<u64, String> {
     let refuse =

@@ -261,7 +261,7 @@ fn read_rate<R: BufRead>(
         true => itself(period),
         false => of(&RateSource::FrameTime(&text)).map(|found| found.grid),
     };
-    let out_of_range = || format!("a frame time of {text} s; it is from 1e-9 to 1e9");
+    let out_of_range = || format!("a frame time of {text} s is out of range (1e-9 to 1e9 s)");
     if let Some(other) = options.override_rate {
         let message = match rate {
             Some(rate) => overridden(rate, other),

@@ -297,7 +297,7 @@ impl<'a> Curve<'a> {
     }
 }
 
-/// The parameter at which the cubic of Bézier 0, p1, p2, 1 is x0, by Newton's method.
+/// Solves B(t) = x0 by Newton's method, where B is the cubic Bézier polynomial with the control values 0, p1, p2, 1.
 fn bezier_parameter(p1: f64, p2: f64, x0: f64) -> f64 {
     let (p1_3, p2_3) = (p1 * 3.0, p2 * 3.0);
     let (a, b, c) = (p1_3 - p2_3 + 1.0, p2_3 - p1_3 - p1_3, p1_3);

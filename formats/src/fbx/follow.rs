@@ -82,7 +82,7 @@ pub(super) struct ChannelFollower<'a> {
     pub(super) rate: Option<FrameRate>,
     /// Whether keys are added only where rotations need them.
     pub(super) keyframes: bool,
-    /// The largest number of keys of the channel, for which there is memory.
+    /// The limit on the number of keys of the channel, by the memory that is left.
     pub(super) max_keys: usize,
 }
 

@@ -198,7 +198,7 @@ impl MovedChannel {
                 )
             });
         }
-        // A cubic's key has three values: the tangent that arrives, the value, the one that leaves.
+        // A CUBICSPLINE key has three values: in-tangent, value, out-tangent.
         let value = |key: usize, which: usize| {
             let of = |which: usize| &of_key(kept[key])[which * width..][..width];
             of(if is_cubic { which } else { 0 })

@@ -62,8 +62,8 @@ impl EndSample {
         self.is_held().then(|| {
             let [at, time] = [self.at, self.time].map(|time| clock_text(time_offset, time));
             let message = format!(
-                "the clip ends at {at} s, between two frames at {rate} fps; one more frame, at {time} s, has \
-                 the value of the end (--end-frame leave-out omits it)"
+                "the clip ends at {at} s, between two frames at {rate} fps; a last frame, at {time} s, \
+                 repeats the end (--end-frame leave-out omits it)"
             );
             Diagnostic::new(name, Code::EndHeld, message)
         })

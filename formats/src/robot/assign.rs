@@ -399,7 +399,7 @@ fn choose(
         .transpose()?;
     if names.is_empty() && tree.counts().scalars > 0 {
         return Err(refuse(
-            "the file has no angles of joints: it is no motion of a robot, and motions of people are not carried to \
+            "the file has no joint angles, so it is no motion of a robot; motions of people cannot be retargeted to \
              robots"
                 .to_owned(),
         ));

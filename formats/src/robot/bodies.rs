@@ -292,7 +292,7 @@ fn set_differences(all: &mut [(Configuration, ConfigurationRates)], times: &[f64
             rotation_vector::log_of(step, None) / apart
         };
         for (ball, rate) in rates.balls.iter_mut().enumerate() {
-            // In the axes of the body.
+            // Angular velocities of ball joints are expressed in the axes of the body.
             *rate = at.balls[ball].inverse() * angular(&|at| at.balls[ball]);
         }
         for (free, rate) in rates.free.iter_mut().enumerate() {
@@ -547,7 +547,7 @@ impl JointTracks {
             if let &Some(track) = track {
                 let (pose, rate) = channels.pose(track, sample);
                 configuration.balls[ball] = pose.rotation;
-                // In the axes of the body.
+                // Angular velocities of ball joints are expressed in the axes of the body.
                 rates.balls[ball] = pose.rotation.inverse() * rate.angular;
             }
         }

@@ -382,8 +382,11 @@ impl TableClip<'_> {
             }
             warnings.warn_of(missing.len(), Code::Bridged, || {
                 let message = format!(
-                    "the track `{name}` lacks {} of its keys; it is interpolated from the others",
-                    missing.len()
+                    "{} of the track `{name}` without a value left out; the curve joins the others",
+                    match missing.len() {
+                        1 => "1 key".to_owned(),
+                        count => format!("{count} keys"),
+                    }
                 );
                 let row = self.row(missing[0] as usize);
                 (
@@ -492,8 +495,8 @@ impl TableClip<'_> {
     }
 }
 
-/// The positions of the rows with scalars, by increasing time, and the list with their times: those of the first track, or
-/// all of a table without tracks.
+/// The indices of the rows with scalars, sorted by time, and the index of the list of their times. These are the rows of
+/// the first track, or all rows of a table without tracks.
 fn scalar_rows(shared: &SharedRows<'_>) -> (Vec<u32>, usize) {
     match shared.tracks.first() {
         Some(track) => (shared.positions(track).to_vec(), track.list),

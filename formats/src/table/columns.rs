@@ -144,10 +144,8 @@ impl Table {
                     true => "fill it in, remove the row, or leave the key out with --bridge-gaps",
                     false => "fill it in or remove the row",
                 };
-                let message = format!(
-                    "column `{}` has no value in row {row}; {remedy}",
-                    column.name
-                );
+                // The location of the message names the row, or the line of a text.
+                let message = format!("column `{}` has no value; {remedy}", column.name);
                 return Err(self.refuse_at(index, row, Code::Null, message));
             }
         }

@@ -42,7 +42,7 @@ pub(crate) fn parse(token: &str) -> Result<Number, Refusal> {
         };
         return Ok(Number {
             value,
-            vanished: false, // 22 decimals are far from the end of f32
+            vanished: false, // 22 decimals do not underflow f32
         });
     }
     // Rust's parser takes exactly this grammar, correctly rounded.

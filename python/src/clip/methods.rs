@@ -205,7 +205,7 @@ impl Clip {
         Some(self.source.as_ref()?.path.clone())
     }
 
-    /// That of clips that are the same is the same.
+    /// A hash; clips that are equal (`==`) have the same.
     fn __hash__(&self) -> u64 {
         let set = &self.motion.set;
         let (first, last) = self.span();
@@ -230,7 +230,7 @@ impl Clip {
         PyTuple::new(py, [again, PyTuple::new(py, [state])?.into_any()])
     }
 
-    /// Clips do not change: the copy is the clip.
+    /// Returns the clip itself: clips are immutable.
     fn __copy__(slf: Bound<'_, Self>) -> Bound<'_, Self> {
         slf
     }

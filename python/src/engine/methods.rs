@@ -110,7 +110,7 @@ impl Engine {
         PyTuple::new(py, [again, PyTuple::empty(py).into_any()])
     }
 
-    /// An engine may be shared.
+    /// Returns the engine itself: engines are immutable and may be shared.
     fn __copy__(slf: Bound<'_, Self>) -> Bound<'_, Self> {
         slf
     }

@@ -203,7 +203,7 @@ impl FindCurves<'_> {
             let limit_ratio = limit_ratio
                 .larger(chords)
                 .larger(cosine_minus_one * L::all(-1.0 / LARGEST_COSINE_MINUS_ONE));
-            // 0 where everything is valid, else `IN_DOUBT`; `sign` is 1 for NaN.
+            // 0 where everything is valid, otherwise `IN_DOUBT`. NaN counts as in doubt, because its `sign` is 1.
             let half = L::all(0.5 * IN_DOUBT as f32);
             let doubt = (limit_ratio - L::all(1.0)).sign() * half + half;
             let squared_extent = squared_extent([w1, w2, w3]) + doubt;

@@ -330,7 +330,7 @@ impl VulkanEngine {
             memory.has_come_back();
         }
         if stopwatch.slow {
-            self.halve_windows(); // those of the next call
+            self.halve_windows(); // the windows of this call are submitted; the next call uses the smaller ones
         }
         if result.is_err() {
             in_flight.clear(); // a fence or a recording may be half way

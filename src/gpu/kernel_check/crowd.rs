@@ -57,7 +57,7 @@ pub(super) fn entry(random: &mut Random, clip: u32, period: u32, clock: u64) -> 
     let backwards = if random.once_in(2) { RUNS_BACKWARDS } else { 0 };
     let mut speed = number(random, 23) as u32 & SPEED_MAGNITUDE;
     if random.once_in(4) {
-        speed = 0; // it may stand at a key
+        speed = 0; // a layer that stands still, possibly exactly at a key
     }
     let weight = random.below(0x8001);
     let weight = if random.once_in(4) { 0 } else { weight };

@@ -28,7 +28,7 @@ const CLOCK: u64 = 0x00ab_cdef_0123_4567;
 pub(super) fn trials(kernel: Kernel, random: &mut Random) -> Vec<Trial> {
     use CrowdValues::{Local, Model, Rotations, Skinning};
     if kernel == Kernel::CrowdSubgroupRotations {
-        // Two instances with two time bases, and one of them, for subgroups with the fewest lanes.
+        // Two instances (with two time bases) and a single one, for the smallest subgroup size.
         return [2, 1]
             .map(|instances| of_subgroups(random, instances))
             .into();

@@ -113,9 +113,9 @@ impl PhysicalDevice {
         let instance = &self.instance.raw;
         // SAFETY: the physical device belongs to the instance, here and below.
         let properties = unsafe { instance.get_physical_device_properties(self.raw) };
-        // SAFETY: as above.
+        // SAFETY: the physical device belongs to the instance.
         let families = unsafe { instance.get_physical_device_queue_family_properties(self.raw) };
-        // SAFETY: as above.
+        // SAFETY: the physical device belongs to the instance.
         let extensions = unsafe { instance.enumerate_device_extension_properties(self.raw) };
         let extensions = extensions.unwrap_or_default();
         let has = |name| {

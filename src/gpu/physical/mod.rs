@@ -116,7 +116,7 @@ impl PhysicalDevice {
         let vk_instance = &instance.raw;
         // SAFETY: `raw` was enumerated from this instance, here and below.
         let families = unsafe { vk_instance.get_physical_device_queue_family_properties(raw) };
-        // SAFETY: as above.
+        // SAFETY: `raw` was enumerated from this instance.
         let properties = unsafe { vk_instance.get_physical_device_properties(raw) };
         let Some(queue_family) = compute_family(&families) else {
             return Ok(None);
@@ -124,7 +124,7 @@ impl PhysicalDevice {
         if properties.api_version < vk::API_VERSION_1_1 {
             return Ok(None);
         }
-        // SAFETY: as above.
+        // SAFETY: `raw` was enumerated from this instance.
         let extensions = unsafe { vk_instance.enumerate_device_extension_properties(raw) }
             .named("vkEnumerateDeviceExtensionProperties")?;
         let has = |name| {
@@ -157,7 +157,7 @@ impl PhysicalDevice {
         }
         // SAFETY: Vulkan 1.1; only structures that the device knows are chained.
         unsafe { vk_instance.get_physical_device_properties2(raw, &mut all) };
-        // SAFETY: as above.
+        // SAFETY: `raw` was enumerated from this instance.
         let memory = unsafe { vk_instance.get_physical_device_memory_properties(raw) };
         let mut timelines = vk::PhysicalDeviceTimelineSemaphoreFeatures::default();
         let mut features = vk::PhysicalDeviceFeatures2::default();

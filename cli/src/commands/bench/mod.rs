@@ -39,10 +39,10 @@ pub(crate) struct Arguments {
     #[arg(value_enum, default_values = ["sparse", "small"])]
     workloads: Vec<WorkloadKind>,
     /// How often each is measured, after a warm-up; the median is reported
-    #[arg(long, default_value_t = 7, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    #[arg(long, default_value_t = 7, value_parser = words::whole_number::<u32>(1, 1000))]
     rounds: u32,
     /// Make every workload smaller by this factor, to try it out
-    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, default_value_t = 1, value_parser = words::whole_number::<u32>(1, u64::from(u32::MAX)))]
     shrink: u32,
     /// Leave Vulkan devices out
     #[arg(long)]

@@ -78,7 +78,7 @@ impl BenchReport {
         Self {
             version: env!("CARGO_PKG_VERSION"),
             threads: rayon::current_num_threads(),
-            vector_widths: widths.iter().map(|width| format!("{width:?}")).collect(),
+            vector_widths: widths.iter().map(|width| width.name().to_owned()).collect(),
             rounds,
             devices,
             sections,

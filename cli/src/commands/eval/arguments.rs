@@ -290,7 +290,9 @@ impl FromStr for ShardSelection {
                 .filter(|(index, all)| index <= all)
                 .map(|(index, all)| Self::Of(index, all)),
         };
-        part.ok_or_else(|| "give I/N, from 1/N to N/N, or the number of a shard, from 1".to_owned())
+        part.ok_or_else(|| {
+            "give I/N with I from 1 to N, or the number of a shard, from 1".to_owned()
+        })
     }
 }
 

@@ -150,10 +150,6 @@ impl EvaluationJob<'_> {
             let mut each = clips.iter();
             each.try_for_each(|clip| check_has_tracks(name, clip, remedy))?;
         }
-        // Writers of clips themselves report the data that they cannot store.
-        if kind != ResultKind::Motion {
-            self.warn_of_lost_channels(clips);
-        }
         let end_frame = (self.arguments.end_frame)
             .for_result(self.arguments.result(kind, target.format()).sampled())
             .map_err(|message| refused(Failure::usage(message)))?;
@@ -178,13 +174,19 @@ impl EvaluationJob<'_> {
                 format!("{name}: --quantity needs a single animation; choose one with --animation");
             return Err(Failure::usage(message));
         };
+        // Writers of clips, which returned above, report the data that they cannot store themselves.
         if let Some(quantity) = output.scalars() {
+            self.warn_of_lost_channels(clips);
             return self.scalars(name, clip, quantity, end_frame, target);
         }
         if let (ResultKind::Poses, Some(poses)) = (kind, output.poses()) {
+            self.warn_of_lost_channels(clips);
             return self.poses(name, clip, poses, end_frame, target);
         }
-        self.rotations(name, &*tracks.select(clip, name)?, end_frame, target)
+        // Selected before the warning, so that an unknown track is the only message.
+        let selected = tracks.select(clip, name)?;
+        self.warn_of_lost_channels(clips);
+        self.rotations(name, &selected, end_frame, target)
     }
 
     /// Warns where the evaluated curves are less smooth than their method promises.
@@ -383,7 +385,9 @@ impl EvaluationJob<'_> {
             count => format!(" ({count} in gaps {})", self.arguments.gaps.done_in_gaps()),
         };
         let left_out = match self.left_out {
-            Some(seconds) => format!(" (the {seconds:.3} s after the last one are left out)"),
+            Some(seconds) => {
+                format!(" ({seconds:.3} s of the clip, after the last frame, are left out)")
+            }
             None => String::new(),
         };
         let assumed = work.clips();
@@ -394,9 +398,13 @@ impl EvaluationJob<'_> {
         let assumed = assumed_fps.as_ref().map_or(String::new(), |rate| {
             format!(" ({rate} fps, because its keys have no rate)")
         });
+        let counted_frames = words::count(frames, "frame");
+        let extent = match work.clips().len() {
+            0 | 1 => format!("{counted} × {counted_frames}"),
+            clips => format!("{clips} clips of {counted}, {counted_frames} in all"),
+        };
         let done = format!(
-            "{counted} × {}{assumed}{in_gaps}{left_out}, {}{stated}",
-            words::count(frames, "frame"),
+            "{extent}{assumed}{in_gaps}{left_out}, {}{stated}",
             self.arguments.method,
         );
         let report = EvaluationReport {

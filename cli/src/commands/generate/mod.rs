@@ -27,10 +27,10 @@ pub(crate) struct Arguments {
     #[arg(long)]
     overwrite: bool,
     /// Number of boxes: tracks
-    #[arg(long, default_value = "4", value_parser = clap::value_parser!(u32).range(1..=65_536))]
+    #[arg(long, default_value = "4", value_parser = words::whole_number::<u32>(1, 65_536))]
     boxes: u32,
     /// Keys of each box
-    #[arg(long, default_value = "26", value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, default_value = "26", value_parser = words::whole_number::<u32>(1, u64::from(u32::MAX)))]
     keys: u32,
     /// The duration, seconds: the time of the last key; the first is at 0
     #[arg(long, default_value = "20", value_parser = positive, allow_hyphen_values = true)]

@@ -15,6 +15,7 @@ use crate::commands::prove::ReportOutput;
 use crate::commands::prove::device;
 use crate::commands::prove::report::{Host, LAB_FORMAT, LAB_FORMAT_VERSION, Program};
 use crate::messages::exit::{DEVICE, DIFFERENCE, Failure};
+use crate::messages::words;
 
 /// Measure which variant of the kernels for graphics cards is the fastest, and compare every variant with the CPU
 #[derive(Debug, Args)]
@@ -26,7 +27,9 @@ same function on the CPU, and left out if a bit differs. Then the limits of the 
 
 Exit codes:
   0  no bit differs
-  6  bits differ
+  5  there is no Vulkan device
+  6  bits differ, or the device failed
+  8  nothing was compared: --device cpu
 
 Examples:
   tumble lab --bits                              compare only: nothing is measured
@@ -42,7 +45,7 @@ pub(crate) struct Arguments {
         long,
         value_name = "SECONDS",
         default_value_t = 150,
-        value_parser = clap::value_parser!(u64).range(1..=86_400)
+        value_parser = words::whole_number::<u64>(1, 86_400)
     )]
     time_limit: u64,
     /// Compare bits only, and measure nothing
@@ -72,8 +75,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let Some(vulkan) = vulkan_device(arguments.device.as_deref())? else {
         return Err(Failure::new(
             DIFFERENCE,
-            "nothing is compared: the CPU has no such kernels; name a Vulkan device with --device, or leave \
-             that out for the first one (`tumble devices` lists them)",
+            "nothing is compared: only Vulkan devices have kernels to measure; leave out --device for the first \
+             one, or name one (`tumble devices`)",
         ));
     };
     arguments.output.check()?;

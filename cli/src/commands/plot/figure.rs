@@ -110,7 +110,7 @@ pub(crate) fn range_of(values: impl IntoIterator<Item = f64>) -> Range<f64> {
     low - room..high + room
 }
 
-/// An axis of times, and the time that is its 0.
+/// An axis of times, and the time at which it shows 0 [s].
 pub(crate) struct TimeAxis {
     pub(crate) axis: PlotAxis,
     pub(crate) origin: f64,

@@ -85,7 +85,7 @@ pub(super) fn figure(
                 .iter()
                 .flat_map(|curve| curve.pieces.iter().flatten())
         };
-        // If a body never rolls, its roll is only rounding. With a smallest range, rounding does not fill the panel.
+        // The smallest range of the axis, degrees: without it, the rounding of a constant roll would fill the panel.
         let least = if matches!(show, PathQuantity::Roll) {
             [-1.0, 1.0]
         } else {

@@ -17,19 +17,21 @@ use crate::commands::prove::report::Verdict;
 use crate::commands::prove::steps::ProofOptions;
 use crate::messages::exit::{DEVICE, DIFFERENCE, Failure};
 use crate::messages::listing;
+use crate::messages::words;
 
 /// Test that a device gives the same bits as the CPU, for every kernel and for recorded and random inputs, and measure its speed
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Every kernel is compared with the same function on the CPU. Recorded results of every method, output \
-and crowd are computed in every configuration in which the engine may use the device. Random tracks \
+Every kernel is compared with the same function on the CPU. The recorded results of every method, output \
+and crowd are computed again in every configuration in which the engine may use the device. Random tracks \
 and crowds are compared with the CPU until the time limit. The same is done on a Vulkan device that is \
-created as a renderer would. Every bit is compared. Times are measured by the device's clock. \
+created in the way in which a renderer creates it. Every bit is compared. Times are measured by the device's clock. \
 `docs/proofs.md` lists devices that were tested, and explains the JSON.
 
 Exit codes:
   0  proved: everything ran, and no bit differs
-  6  bits differ
+  5  there is no Vulkan device
+  6  bits differ, or the device failed
   8  not proved: something did not run or was not compared, or the validation layer complained
 
 Examples:
@@ -48,7 +50,7 @@ pub(crate) struct Arguments {
         alias = "seconds",
         value_name = "SECONDS",
         default_value_t = 480,
-        value_parser = clap::value_parser!(u64).range(1..=86_400)
+        value_parser = words::whole_number::<u64>(1, 86_400)
     )]
     time_limit: u64,
     /// Run only what a proof needs: no additional random rounds, and no repetition in every configuration

@@ -171,7 +171,7 @@ impl RenderOutput {
             Some("png") => Ok(Self::Still),
             None if !names::is_standard(path) => Ok(Self::Folder),
             _ => Err(Failure::usage(format!(
-                "{}: end the film in .gif or .apng, a picture in .png, or give a directory",
+                "{}: unknown ending; give .gif or .apng for a film, .png for a picture, or a directory",
                 path.display()
             ))),
         }

@@ -199,10 +199,13 @@ fn warn_of_moved_ends(outcome: &RouteOutcome, size: f64) {
     let Ok((route, _)) = &outcome.found else {
         return;
     };
-    for (end, off) in ["start", "goal"].into_iter().zip(route.off) {
+    for (end, off) in ["start", "end"].into_iter().zip(route.off) {
         if off > 1e-6 * size {
+            // Four digits: the distance only shows how wrong the point is.
+            let digits = format!("{off:.3e}");
+            let off = digits.parse().unwrap_or(off);
             words::warning(&format!(
-                "{}: the {end} is {off} away from the surface; the nearest point of the surface is used",
+                "{}: the {end} point is {off} away from the surface; the nearest point of the surface is used",
                 outcome.name
             ));
         }

@@ -40,9 +40,9 @@ use crate::messages::{names, words};
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Kernels are linear, cubic, box:S and tent:S (S samples before and after), gaussian:S (standard deviation \
-in samples), and savitzky-golay:RADIUS:ORDER. They filter the steps from sample to sample, so constant \
-tracks keep their bits and uniform motion does not change. --low-pass HZ is the Gaussian that halves the \
-power of motion at that frequency, at any rate of the samples. If keys are evenly spaced, they are the \
+in samples), and savitzky-golay:RADIUS:ORDER. They filter the increments from sample to sample, so that \
+constant tracks keep their bits and uniform motion does not change. --low-pass HZ is the Gaussian with \
+-3 dB (half the power) at that frequency, at any rate of the samples. If keys are evenly spaced, they are the \
 samples; otherwise give the rate by --fps. NPY contains only the rotations; CSV, Parquet and Arrow contain \
 positions too, as of `tumble eval`. If the output has the format of the input, everything else in the \
 file is kept. Stepped channels stay stepped.

@@ -50,7 +50,7 @@ and at the keys. Other methods, rates and times are evaluated in the page, by th
 the same bits. Skeletons are drawn as bones, with the meshes of a glTF file, and all animations of a \
 file are in a menu. Files of paths, and joints without parents that move, are drawn as boxes on their \
 paths, with frames as small axes. \
-Several inputs are shown at once, at the same moment: the first one solid, the others as translucent \
+Several inputs are shown together and in time with each other: the first one solid, the others as translucent \
 ghosts, each in a different colour. A list names them, can hide each, and shows the joint with the largest \
 difference from the solid input; a menu selects the solid input. Joints, and animations of files with \
 several, are matched by equal names.
@@ -89,7 +89,7 @@ pub(crate) struct Arguments {
     /// page stays small, else authored,bessel-overhauser,slerp,catmull-rom,b-spline]
     #[arg(short, long = "method", value_name = "METHODS", value_delimiter = ',', value_parser = method_arguments())]
     methods: Vec<MethodArgumentSelection>,
-    /// Frames per second: from the first key to the last, a number or a ratio
+    /// Frames per second, from the first key to the last: a number or a ratio
     #[arg(
         long,
         value_name = "FPS",

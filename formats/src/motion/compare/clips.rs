@@ -192,8 +192,7 @@ impl ClipPair<'_> {
             });
             let [start, end] = on_clock([start, end]);
             format!(
-                "the keys of both do not lie at the same times: {first}, {second}; compared from {start} to \
-                 {end} s"
+                "the clips have keys in different ranges of time: {first}, {second}; compared from {start} to {end} s"
             )
         });
         Ok(CommonTimes {

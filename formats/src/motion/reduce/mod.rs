@@ -87,8 +87,8 @@ pub enum ReduceMotionError {
     },
     /// A bound is smaller than the precision with which keys are stored.
     #[error(
-        "even with all samples as keys the error is {found:.3e} {unit}, and the bound is {bound:.3e}; keys are \
-         {kept}: give a larger bound"
+        "the tolerance of {bound:.3e} {unit} cannot be reached: even with all samples as keys the error is \
+         {found:.3e} {unit}, because keys are {kept}; give a larger tolerance"
     )]
     TooSmall {
         /// The largest error with all samples as keys.

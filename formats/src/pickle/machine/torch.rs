@@ -20,7 +20,7 @@ const BEFORE_ARCHIVES: &[u8] = b"\x80\x02\x8a\x0al\xfc\x9cF\xf9 j\xa8P\x19.";
 
 /// Whether a file that begins with these bytes is an archive of `torch.save`, whose first member is its pickle.
 pub(in crate::pickle) fn is_archive(start: &[u8]) -> bool {
-    // APPNOTE.TXT 4.3.7: at 26 the length of the name, which follows 30 bytes.
+    // The local header of a ZIP member (APPNOTE.TXT 4.3.7): the length of the name at byte 26, the name at byte 30.
     let name = || {
         let length = start.get(26..28)?.try_into().ok()?;
         start.get(30..30 + usize::from(u16::from_le_bytes(length)))
