@@ -123,8 +123,14 @@ mod tests {
         let rotations = CrowdOutput::from(CrowdValues::Rotations);
         let half = CrowdOutput::half(CrowdValues::Rotations);
         let kernel = |output| of(output, true).map(|found| found.kernel() as usize);
-        assert_eq!(kernel(rotations), Some(Kernel::CrowdSubgroupRotations as usize));
-        assert_eq!(kernel(half), Some(Kernel::CrowdSubgroupRotationsF16 as usize));
+        assert_eq!(
+            kernel(rotations),
+            Some(Kernel::CrowdSubgroupRotations as usize)
+        );
+        assert_eq!(
+            kernel(half),
+            Some(Kernel::CrowdSubgroupRotationsF16 as usize)
+        );
         assert!(of(rotations, false).is_none() && of(half, false).is_none());
         assert_eq!(of(CrowdValues::Local.into(), true), None);
     }

@@ -498,7 +498,10 @@ impl Goal {
     /// of each sample and by the bytes that are written.
     fn time(&self, instructions: usize) -> f64 {
         const SAMPLES: f64 = 4096.0 * 1200.0;
-        time_on_h200(instructions as f64 * SAMPLES / 32.0, self.bytes as f64 * SAMPLES)
+        time_on_h200(
+            instructions as f64 * SAMPLES / 32.0,
+            self.bytes as f64 * SAMPLES,
+        )
     }
 }
 
@@ -607,11 +610,17 @@ fn crowds_take_as_many_instructions_as_planned() {
             _ => instance_of_rotations(listing),
         };
         if let Some(max) = goal.max.filter(|max| instructions > *max) {
-            wrong.push(format!("{}: {instructions} instructions, not {max}", goal.row));
+            wrong.push(format!(
+                "{}: {instructions} instructions, not {max}",
+                goal.row
+            ));
         }
         let bytes = (goal.bytes * JOINTS) as f64 * INSTANCES;
         let time = time_on_h200(instructions as f64 * INSTANCES, bytes);
-        rows.insert(goal.row, vec![instructions.to_string(), format!("{time:.1}")]);
+        rows.insert(
+            goal.row,
+            vec![instructions.to_string(), format!("{time:.1}")],
+        );
     }
     wrong.extend(table::check_rows(CROWDS, &rows));
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
