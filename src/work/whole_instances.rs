@@ -40,7 +40,7 @@ impl WholeInstances {
         let is_rotations = output.values == CrowdValues::Rotations;
         let room = (MAX_WHOLE_JOINTS / joints).min(MAX_WHOLE_POSITIONS / (layers * bases));
         // Joints of a level are divided among instances by bits, so those of matrices are a power of two.
-        let is_taken = |instances: &u32| is_rotations || instances.is_power_of_two();
+        let is_divided = |instances: &u32| is_rotations || instances.is_power_of_two();
         // The number of iterations of a workgroup over its joints. Rotations are stored immediately. They may begin
         // within a line; then the invocations before them are idle.
         let line = LINE_VECTORS << u32::from(output.is_half);
@@ -51,7 +51,7 @@ impl WholeInstances {
             (joints + idle).div_ceil(CROWD_WORKGROUP)
         };
         let instances = (1..=room)
-            .filter(is_taken)
+            .filter(is_divided)
             .min_by(|&a, &b| (rounds(a) * b).cmp(&(rounds(b) * a)).then(b.cmp(&a)))?;
         Some(Self {
             kernel: match (is_rotations, is_plain) {

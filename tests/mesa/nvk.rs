@@ -89,12 +89,12 @@ impl Listing {
     /// The instructions of a warp on its usual way from the start to the end. `trips` says how often it goes through a
     /// loop, from the stores of that way through it.
     fn typical(&self, trips: &dyn Fn(usize) -> usize) -> usize {
-        self.usual(&|_, stores| trips(stores), PRODUCTS)
+        self.typical_by(&|_, stores| trips(stores), PRODUCTS)
     }
 
     /// As [`Listing::typical`], where `trips` also gets the block where a loop begins, and blocks with so many products
     /// or more evaluate.
-    fn usual(&self, trips: &dyn Fn(usize, usize) -> usize, products: usize) -> usize {
+    fn typical_by(&self, trips: &dyn Fn(usize, usize) -> usize, products: usize) -> usize {
         let all = (0..self.blocks.len()).collect();
         let ends = |at: usize| self.blocks[at].next.is_empty();
         let walk = Walk {
@@ -114,8 +114,8 @@ impl Listing {
             let mut others = loops.iter().filter(|(other, _)| other != start);
             others.any(|(_, other)| body.is_subset(other))
         });
-        let way = (&|_: usize, _: usize| 1_usize) as &dyn Fn(usize, usize) -> usize;
-        let traces = inner.map(|(start, body)| self.through(*start, body, way, PRODUCTS, &loops));
+        let once = (&|_: usize, _: usize| 1_usize) as &dyn Fn(usize, usize) -> usize;
+        let traces = inner.map(|(start, body)| self.through(*start, body, once, PRODUCTS, &loops));
         let storing = traces.filter(|trace| trace.stores == 1);
         storing.map(|trace| trace.instructions).max().unwrap_or(0)
     }
@@ -661,7 +661,7 @@ fn instance_of_matrices(listing: &Listing, levels: usize) -> usize {
         (false, false) => 0,
     };
     // Curves of translations and scales have ten products, rows that inverse bind matrices multiply twelve.
-    let warp = |of_first| listing.usual(&|start, _| trips(start, of_first), 13);
+    let warp = |of_first| listing.typical_by(&|start, _| trips(start, of_first), 13);
     (warp(true) + warp(false)).div_ceil(4)
 }
 
