@@ -255,7 +255,7 @@ const CHANNELS: [&str; 10] = [
     "crowd/layer_value",
 ];
 
-/// The same where it is simple.
+/// The same where it is simple, beside a file with the curves of translations and scales.
 const PLAIN_CHANNELS: [&str; 7] = [
     "math/canonical",
     "math/sine_cosine",
@@ -278,7 +278,11 @@ static CROWD_READS: [Read; 4] = [
 /// it shares.
 const CROWD_JOINTS: [(&str, &[&str], &[&str]); 4] = [
     ("rotations", &CHANNELS, &["crowd/layers", "crowd/rotations"]),
-    ("plain_rotations", &PLAIN_CHANNELS, &["crowd/rotations"]),
+    (
+        "plain_rotations",
+        &PLAIN_CHANNELS,
+        &["crowd/plain_cubic", "crowd/rotations"],
+    ),
     (
         "locals",
         &CHANNELS,
@@ -292,7 +296,12 @@ const CROWD_JOINTS: [(&str, &[&str], &[&str]); 4] = [
     (
         "plain_locals",
         &PLAIN_CHANNELS,
-        &["math/matrix", "crowd/transform", "crowd/locals"],
+        &[
+            "math/matrix",
+            "crowd/plain_cubic",
+            "crowd/transform",
+            "crowd/locals",
+        ],
     ),
 ];
 
@@ -374,6 +383,9 @@ const WHOLE_MATRICES: [&str; 5] = [
     "crowd/whole_matrices",
 ];
 
+/// The curves of translations and scales on cards, where instances have one layer.
+const WHOLE_CUBIC: [&str; 1] = ["crowd/cubic_or_constant"];
+
 /// Kernels over whole instances, for cards, each with the files that it needs beside those that it shares.
 const CROWD_WHOLE: [(&str, &[&[&str]]); 4] = [
     (
@@ -382,17 +394,20 @@ const CROWD_WHOLE: [(&str, &[&[&str]]); 4] = [
     ),
     (
         "plain_whole_rotations",
-        &[&PLAIN_CHANNELS, &["crowd/whole_rotations"]],
+        &[&PLAIN_CHANNELS, &WHOLE_CUBIC, &["crowd/whole_rotations"]],
     ),
     (
         "whole_matrices",
         &[&CHANNELS, &["crowd/layers"], &WHOLE_MATRICES],
     ),
-    ("plain_whole_matrices", &[&PLAIN_CHANNELS, &WHOLE_MATRICES]),
+    (
+        "plain_whole_matrices",
+        &[&PLAIN_CHANNELS, &WHOLE_CUBIC, &WHOLE_MATRICES],
+    ),
 ];
 
-/// The kernel over whole instances for cards whose subgroups vote and shuffle: its files.
-const CROWD_SUBGROUPS: [&str; 11] = [
+/// The kernels over whole instances for cards whose subgroups vote and shuffle: the files that they share.
+const CROWD_SUBGROUPS: [&str; 9] = [
     "crowd/workgroup",
     "math/canonical",
     "math/sine_cosine",
@@ -402,11 +417,15 @@ const CROWD_SUBGROUPS: [&str; 11] = [
     "crowd/plain_arc",
     "crowd/time_tables",
     "crowd/ticks",
-    "stores/f32",
-    "crowd/subgroup_rotations",
 ];
 
-/// The buffers that it reads.
+/// Each with the files that store.
+const CROWD_SUBGROUP_STORES: [(&str, &[&str]); 2] = [
+    ("subgroup_rotations", &["stores/f32"]),
+    ("subgroup_rotations_f16", &["math/half", "stores/f16"]),
+];
+
+/// The buffers that they read.
 static WHOLE_READS: [Read; 6] = [
     read("entries", "CrowdEntry", "entry_at"),
     read("clips", "CrowdClip", "clip_at"),
@@ -573,15 +592,17 @@ pub(crate) fn kernels() -> Vec<Kernel> {
             converts: false,
         });
     }
-    kernels.push(Kernel {
-        name: "crowd_subgroup_rotations".to_owned(),
-        files: CROWD_SUBGROUPS.to_vec(),
-        reads: WHOLE_READS.iter().collect(),
-        has_texels: false,
-        loads_vectors: true,
-        streams_results: false,
-        converts: false,
-    });
+    for (name, store) in CROWD_SUBGROUP_STORES {
+        kernels.push(Kernel {
+            name: format!("crowd_{name}"),
+            files: [&CROWD_SUBGROUPS, store, &["crowd/subgroup_rotations"]].concat(),
+            reads: WHOLE_READS.iter().collect(),
+            has_texels: false,
+            loads_vectors: true,
+            streams_results: false,
+            converts: store.contains(&"stores/f16"),
+        });
+    }
     for (name, parts) in MOTION {
         kernels.push(Kernel {
             name: format!("motion_{name}"),

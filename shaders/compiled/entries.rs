@@ -266,9 +266,8 @@ const fn entry(
 }
 
 /// The entry points: those of the kernels in their order, and then those that read texel buffers.
-pub(crate) static ENTRIES: [Entry; 198] = [
+pub(crate) static ENTRIES: [Entry; 199] = [
     entry(0, None, 64, None),
-    entry(1, Some(Global::Dispatch), 64, Some(143)),
     entry(1, Some(Global::Dispatch), 64, Some(144)),
     entry(1, Some(Global::Dispatch), 64, Some(145)),
     entry(1, Some(Global::Dispatch), 64, Some(146)),
@@ -276,7 +275,7 @@ pub(crate) static ENTRIES: [Entry; 198] = [
     entry(1, Some(Global::Dispatch), 64, Some(148)),
     entry(1, Some(Global::Dispatch), 64, Some(149)),
     entry(1, Some(Global::Dispatch), 64, Some(150)),
-    entry(2, Some(Global::Dispatch), 64, Some(151)),
+    entry(1, Some(Global::Dispatch), 64, Some(151)),
     entry(2, Some(Global::Dispatch), 64, Some(152)),
     entry(2, Some(Global::Dispatch), 64, Some(153)),
     entry(2, Some(Global::Dispatch), 64, Some(154)),
@@ -284,7 +283,7 @@ pub(crate) static ENTRIES: [Entry; 198] = [
     entry(2, Some(Global::Dispatch), 64, Some(156)),
     entry(2, Some(Global::Dispatch), 64, Some(157)),
     entry(2, Some(Global::Dispatch), 64, Some(158)),
-    entry(3, Some(Global::Dispatch), 64, Some(159)),
+    entry(2, Some(Global::Dispatch), 64, Some(159)),
     entry(3, Some(Global::Dispatch), 64, Some(160)),
     entry(3, Some(Global::Dispatch), 64, Some(161)),
     entry(3, Some(Global::Dispatch), 64, Some(162)),
@@ -292,6 +291,7 @@ pub(crate) static ENTRIES: [Entry; 198] = [
     entry(3, Some(Global::Dispatch), 64, Some(164)),
     entry(3, Some(Global::Dispatch), 64, Some(165)),
     entry(3, Some(Global::Dispatch), 64, Some(166)),
+    entry(3, Some(Global::Dispatch), 64, Some(167)),
     entry(4, Some(Global::Dispatch), 64, None),
     entry(4, Some(Global::Dispatch), 64, None),
     entry(4, Some(Global::Dispatch), 64, None),
@@ -324,7 +324,6 @@ pub(crate) static ENTRIES: [Entry; 198] = [
     entry(2, Some(Global::Dispatch), 128, None),
     entry(2, Some(Global::Dispatch), 128, None),
     entry(2, Some(Global::Dispatch), 128, None),
-    entry(1, Some(Global::Dispatch), 64, Some(167)),
     entry(1, Some(Global::Dispatch), 64, Some(168)),
     entry(1, Some(Global::Dispatch), 64, Some(169)),
     entry(1, Some(Global::Dispatch), 64, Some(170)),
@@ -332,7 +331,7 @@ pub(crate) static ENTRIES: [Entry; 198] = [
     entry(1, Some(Global::Dispatch), 64, Some(172)),
     entry(1, Some(Global::Dispatch), 64, Some(173)),
     entry(1, Some(Global::Dispatch), 64, Some(174)),
-    entry(2, Some(Global::Dispatch), 64, Some(175)),
+    entry(1, Some(Global::Dispatch), 64, Some(175)),
     entry(2, Some(Global::Dispatch), 64, Some(176)),
     entry(2, Some(Global::Dispatch), 64, Some(177)),
     entry(2, Some(Global::Dispatch), 64, Some(178)),
@@ -340,7 +339,7 @@ pub(crate) static ENTRIES: [Entry; 198] = [
     entry(2, Some(Global::Dispatch), 64, Some(180)),
     entry(2, Some(Global::Dispatch), 64, Some(181)),
     entry(2, Some(Global::Dispatch), 64, Some(182)),
-    entry(3, Some(Global::Dispatch), 64, Some(183)),
+    entry(2, Some(Global::Dispatch), 64, Some(183)),
     entry(3, Some(Global::Dispatch), 64, Some(184)),
     entry(3, Some(Global::Dispatch), 64, Some(185)),
     entry(3, Some(Global::Dispatch), 64, Some(186)),
@@ -348,6 +347,7 @@ pub(crate) static ENTRIES: [Entry; 198] = [
     entry(3, Some(Global::Dispatch), 64, Some(188)),
     entry(3, Some(Global::Dispatch), 64, Some(189)),
     entry(3, Some(Global::Dispatch), 64, Some(190)),
+    entry(3, Some(Global::Dispatch), 64, Some(191)),
     entry(4, Some(Global::Dispatch), 64, None),
     entry(4, Some(Global::Dispatch), 64, None),
     entry(4, Some(Global::Dispatch), 64, None),
@@ -380,19 +380,19 @@ pub(crate) static ENTRIES: [Entry; 198] = [
     entry(2, Some(Global::Dispatch), 128, None),
     entry(2, Some(Global::Dispatch), 128, None),
     entry(2, Some(Global::Dispatch), 128, None),
-    entry(6, Some(Global::Rows), 64, Some(191)),
     entry(6, Some(Global::Rows), 64, Some(192)),
-    entry(7, Some(Global::Rows), 64, Some(193)),
+    entry(6, Some(Global::Rows), 64, Some(193)),
+    entry(7, Some(Global::Rows), 64, Some(194)),
     entry(8, Some(Global::Dispatch), 64, None),
     entry(9, Some(Global::Dispatch), 64, None),
     entry(10, Some(Global::Dispatch), 64, None),
     entry(11, Some(Global::Dispatch), 64, None),
     entry(12, Some(Global::Dispatch), 64, None),
     entry(13, Some(Global::Dispatch), 64, None),
-    entry(14, Some(Global::Dispatch), 64, Some(194)),
     entry(14, Some(Global::Dispatch), 64, Some(195)),
     entry(14, Some(Global::Dispatch), 64, Some(196)),
     entry(14, Some(Global::Dispatch), 64, Some(197)),
+    entry(14, Some(Global::Dispatch), 64, Some(198)),
     entry(15, Some(Global::Dispatch), 64, None),
     entry(16, Some(Global::Dispatch), 64, None),
     entry(17, Some(Global::Dispatch), 64, None),
@@ -404,6 +404,7 @@ pub(crate) static ENTRIES: [Entry; 198] = [
     entry(21, Some(Global::Dispatch), 64, None),
     entry(22, Some(Global::Dispatch), 64, None),
     entry(22, Some(Global::Dispatch), 64, None),
+    entry(23, Some(Global::Dispatch), 64, None),
     entry(23, Some(Global::Dispatch), 64, None),
     entry(24, Some(Global::Dispatch), 64, None),
     entry(25, Some(Global::Dispatch), 64, None),
@@ -958,7 +959,7 @@ pub(crate) fn base_at<M: Machine>(machine: &M, index: u32) -> CrowdBase {
 /// those after them store whole lines.
 pub(crate) fn before_in_line<M: Machine>(machine: &M, vector: u32) -> u32 {
     let _block = machine.block(line!(), 4);
-    let loaded = machine.load::<u32>(Global::Dispatch, 13);
+    let loaded = machine.load::<u32>(Global::Dispatch, 14);
     vector & (LINE_VECTORS << loaded).wrapping_sub(1u32)
 }
 
@@ -1006,14 +1007,14 @@ pub(crate) fn canonical_product<M: Machine>(
 }
 
 pub(crate) fn cell_at<M: Machine>(machine: &M, index: u32) -> [M::F; 4] {
-    const OF_KERNELS: [u8; 198] = [
+    const OF_KERNELS: [u8; 199] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1,
     ];
     match OF_KERNELS[machine.code()] {
         0 => cell_at_of_readers(machine, index),
@@ -1057,14 +1058,14 @@ pub(crate) fn cell_of<M: Machine>(machine: &M, corner: Corner, iteration: u32) -
 }
 
 pub(crate) fn channel_at<M: Machine>(machine: &M, index: u32) -> CrowdChannel {
-    const OF_KERNELS: [u8; 198] = [
+    const OF_KERNELS: [u8; 199] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1,
     ];
     match OF_KERNELS[machine.code()] {
         0 => channel_at_of_readers(machine, index),
@@ -1123,14 +1124,14 @@ pub(crate) fn composed<M: Machine>(
 }
 
 pub(crate) fn constant_at<M: Machine>(machine: &M, index: u32) -> [M::F; 4] {
-    const OF_KERNELS: [u8; 198] = [
+    const OF_KERNELS: [u8; 199] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1,
         1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
-        1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0,
+        1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => constant_at_of_readers(machine, index),
@@ -1265,14 +1266,14 @@ pub(crate) fn cross3<M: Machine>(machine: &M, a: [M::F; 3], b: [M::F; 3]) -> [M:
 }
 
 pub(crate) fn crowd_work<M: Machine>(machine: &M, index: u32) {
-    const OF_KERNELS: [u8; 198] = [
+    const OF_KERNELS: [u8; 199] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 1, 1, 2, 3, 4, 5, 0, 6, 7, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1,
     ];
     match OF_KERNELS[machine.code()] {
         0 => crowd_work_of_rotations(machine, index),
@@ -1502,8 +1503,29 @@ pub(crate) fn cubic<M: Machine>(
     )
 }
 
-/// A cubic likewise.
 pub(crate) fn cubic_value<M: Machine>(
+    machine: &M,
+    channel: CrowdChannel,
+    at: CrowdPosition<M::F>,
+) -> [M::F; 4] {
+    const OF_KERNELS: [u8; 199] = [
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+    ];
+    match OF_KERNELS[machine.code()] {
+        0 => cubic_value_of_plain_cubic(machine, channel, at),
+        _ => cubic_value_of_cubic_or_constant(machine, channel, at),
+    }
+}
+
+/// A cubic where its time base stands, as `crowd/plain_arc` has arcs: a constant or a key is one without other
+/// coefficients.
+pub(crate) fn cubic_value_of_plain_cubic<M: Machine>(
     machine: &M,
     channel: CrowdChannel,
     at: CrowdPosition<M::F>,
@@ -1545,15 +1567,55 @@ pub(crate) fn cubic_value<M: Machine>(
     if is_key { key_or_first } else { result_4 }
 }
 
+/// A cubic where its time base stands, or a constant.
+pub(crate) fn cubic_value_of_cubic_or_constant<M: Machine>(
+    machine: &M,
+    channel: CrowdChannel,
+    at: CrowdPosition<M::F>,
+) -> [M::F; 4] {
+    let _block = machine.block(line!(), 20);
+    if channel.count == 0u32 {
+        let _block = machine.block(line!(), 1);
+        let result = cell_at(machine, channel.first);
+        return result;
+    }
+    let is_key = at.span & ON_KEY != 0u32;
+    let along = (at.span & TICKS).wrapping_mul(channel.count);
+    let first = channel.first.wrapping_add(along.wrapping_mul(4u32));
+    let second = first.wrapping_add(channel.count);
+    let third = second.wrapping_add(channel.count);
+    let key_or_first = cell_at(
+        machine,
+        if is_key {
+            channel.keys.wrapping_add(along)
+        } else {
+            first
+        },
+    );
+    let result_2 = cell_at(machine, second);
+    let result_3 = cell_at(machine, third);
+    let result_4 = cell_at(machine, third.wrapping_add(channel.count));
+    let value = cubic(
+        machine,
+        key_or_first,
+        result_2,
+        result_3,
+        result_4,
+        at.parameter,
+    );
+    let result_5 = canonical(machine, value);
+    if is_key { key_or_first } else { result_5 }
+}
+
 pub(crate) fn distance_at<M: Machine>(machine: &M, index: u32) -> M::F {
-    const OF_KERNELS: [u8; 198] = [
+    const OF_KERNELS: [u8; 199] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1,
-        1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1,
+        1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => distance_at_of_readers(machine, index),
@@ -1579,14 +1641,14 @@ pub(crate) fn distance_at_of_readers_2<M: Machine>(machine: &M, index: u32) -> M
 }
 
 pub(crate) fn distance_from_middle<M: Machine>(machine: &M, first: i32, j: u32) -> M::F {
-    const OF_KERNELS: [u8; 198] = [
+    const OF_KERNELS: [u8; 199] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0,
         0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1,
         1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1,
-        1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1,
+        1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => distance_from_middle_of_frame_distance(machine, first, j),
@@ -1629,14 +1691,14 @@ pub(crate) fn dot4<M: Machine>(machine: &M, a: [M::F; 4], b: [M::F; 4]) -> M::F 
 }
 
 pub(crate) fn entry_at<M: Machine>(machine: &M, index: u32) -> CrowdEntry {
-    const OF_KERNELS: [u8; 198] = [
+    const OF_KERNELS: [u8; 199] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 2, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 2, 2, 2, 2,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 2, 2, 2, 2,
     ];
     match OF_KERNELS[machine.code()] {
         0 => entry_at_of_readers(machine, index),
@@ -1927,7 +1989,7 @@ pub(crate) fn find_positions<M: Machine>(machine: &M, instances: u32, lane: u32)
 /// Stores a vector of the result.
 pub(crate) fn finish_1<M: Machine>(machine: &M, vector: u32, value: [M::F; 4]) {
     let _block = machine.block(line!(), 3);
-    let loaded = machine.load::<u32>(Global::Dispatch, 13);
+    let loaded = machine.load::<u32>(Global::Dispatch, 14);
     if loaded != 0u32 {
         let _block = machine.block(line!(), 6);
         let half = to_any_half(machine, value);
@@ -1951,14 +2013,14 @@ pub(crate) async fn finish_2<M: Machine>(
     rotation: [M::F; 4],
     is_stored: bool,
 ) {
-    const OF_KERNELS: [u8; 198] = [
+    const OF_KERNELS: [u8; 199] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 2,
         3, 0, 1, 0, 1, 0, 0, 2, 3, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 2, 3, 0, 1, 0,
         1, 0, 0, 2, 3, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => finish_2_of_alone(machine, lane, index, rotation, is_stored).await,
@@ -2313,6 +2375,13 @@ pub(crate) fn hoisted_two_keys_hoisted<M: Machine>(
     TwoKeysHoisted { parameter }
 }
 
+/// The instance of a joint, of those of all instances of the workgroup.
+pub(crate) fn instance_of<M: Machine>(machine: &M, index: u32) -> u32 {
+    let _block = machine.block(line!(), 3);
+    let loaded = machine.load::<u32>(Global::Dispatch, 11);
+    index.wrapping_mul(loaded) >> 20u32
+}
+
 /// Begins with the instances of a workgroup, from the `first` of the dispatch on; returns how many they are.
 pub(crate) fn instances_from<M: Machine>(machine: &M, first: u32) -> u32 {
     let _block = machine.block(line!(), 9);
@@ -2371,14 +2440,14 @@ pub(crate) async fn is_any<M: Machine>(machine: &M, condition: bool) -> bool {
 }
 
 pub(crate) fn item_at_item<M: Machine>(machine: &M, index: u32) -> Item<M::F> {
-    const OF_KERNELS: [u8; 198] = [
+    const OF_KERNELS: [u8; 199] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1,
-        1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
-        1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1,
+        1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
+        1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => item_at_item_of_readers(machine, index),
@@ -2603,14 +2672,14 @@ pub(crate) fn layer_value<M: Machine>(
 }
 
 pub(crate) fn layered<M: Machine>(machine: &M, instance: u32, joint: u32, kind: u32) -> [M::F; 4] {
-    const OF_KERNELS: [u8; 198] = [
+    const OF_KERNELS: [u8; 199] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 1, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 1,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 1,
     ];
     match OF_KERNELS[machine.code()] {
         0 => layered_of_layers(machine, instance, joint, kind),
@@ -2773,15 +2842,15 @@ pub(crate) fn magnitude<M: Machine>(machine: &M, x: M::F) -> M::F {
 }
 
 pub(crate) async fn main<M: Machine>(machine: &M) {
-    const OF_KERNELS: [u8; 198] = [
+    const OF_KERNELS: [u8; 199] = [
         0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 2, 2, 2, 2, 2, 2, 2, 2, 3, 3, 3, 3, 3,
         3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 4, 5, 4, 4, 6, 7, 4, 5, 4, 5, 4, 4, 6, 7, 4, 5, 8, 8, 8,
         8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 9, 9, 9, 9, 9, 9, 9, 9, 10, 10, 10, 10, 10, 10, 10,
         10, 10, 10, 10, 10, 10, 10, 10, 10, 11, 12, 11, 11, 13, 14, 11, 12, 11, 12, 11, 11, 13, 14,
         11, 12, 15, 16, 17, 18, 18, 18, 18, 18, 18, 19, 19, 19, 19, 19, 19, 19, 19, 20, 19, 19, 21,
-        21, 22, 22, 23, 24, 24, 24, 24, 25, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 2, 2,
-        2, 2, 2, 2, 2, 2, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 9, 9, 9, 9, 9, 9, 9, 9,
-        15, 16, 17, 19, 19, 19, 19,
+        21, 22, 22, 23, 23, 24, 24, 24, 24, 25, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 2,
+        2, 2, 2, 2, 2, 2, 2, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 9, 9, 9, 9, 9, 9, 9,
+        9, 15, 16, 17, 19, 19, 19, 19,
     ];
     match OF_KERNELS[machine.code()] {
         0 => main_of_self_test(machine).await,
@@ -5022,7 +5091,7 @@ pub(crate) async fn main_of_whole_rotations<M: Machine>(machine: &M) {
             let _block = machine.block(line!(), 8);
             let loaded_5 = next;
             let index = loaded_5.wrapping_sub(idle);
-            let instance = quotient(index, joints);
+            let instance = instance_of(machine, index);
             let result = layered(
                 machine,
                 instance,
@@ -5044,7 +5113,8 @@ pub(crate) async fn main_of_whole_matrices<M: Machine>(machine: &M) {
     let mut level: u32 = 0u32;
     let mut index: u32 = Default::default();
     let mut next: u32 = Default::default();
-    let _block = machine.block(line!(), 18);
+    let mut next_2: u32 = Default::default();
+    let _block = machine.block(line!(), 26);
     let loaded = machine.load::<u32>(Global::Dispatch, 10);
     let first = group[1]
         .wrapping_mul(groups[0])
@@ -5067,7 +5137,7 @@ pub(crate) async fn main_of_whole_matrices<M: Machine>(machine: &M) {
             break;
         }
         let loaded_4 = matrix;
-        let instance = quotient(loaded_4, joints);
+        let instance = instance_of(machine, loaded_4);
         let loaded_5 = matrix;
         transform_joint(
             machine,
@@ -5079,9 +5149,9 @@ pub(crate) async fn main_of_whole_matrices<M: Machine>(machine: &M) {
     }
     barrier().await;
     loop {
-        let _block = machine.block(line!(), 13);
+        let _block = machine.block(line!(), 18);
         let loaded_7 = level;
-        let loaded_8 = machine.load::<u32>(Global::Dispatch, 11);
+        let loaded_8 = machine.load::<u32>(Global::Dispatch, 12);
         if !(loaded_7 < loaded_8) {
             break;
         }
@@ -5091,56 +5161,91 @@ pub(crate) async fn main_of_whole_matrices<M: Machine>(machine: &M) {
             Global::Links,
             2 * (loaded_9.wrapping_add(loaded_10) as usize),
         );
-        let in_level = bounds.parent.wrapping_sub(bounds.joint);
+        let shift = power_from(machine, bounds.parent.wrapping_sub(bounds.joint));
+        let all = instances << shift;
         index = lane;
-        loop {
-            let _block = machine.block(line!(), 15);
-            let loaded_11 = index;
-            if !(loaded_11 < instances.wrapping_mul(in_level)) {
-                break;
-            }
-            let loaded_12 = index;
-            let instance_2 = quotient(loaded_12, in_level);
-            let loaded_13 = index;
-            let loaded_14 = machine.load::<CrowdLink>(
-                Global::Links,
-                2 * (bounds
+        let loaded_11 = index;
+        if loaded_11 < all {
+            loop {
+                let _block = machine.block(line!(), 14);
+                let loaded_12 = index;
+                let instance_2 = loaded_12 >> shift;
+                let loaded_13 = index;
+                let link = bounds
                     .joint
-                    .wrapping_add(loaded_13.wrapping_sub(instance_2.wrapping_mul(in_level)))
-                    as usize),
-            );
-            walk(machine, instance_2, loaded_14);
-            let loaded_15 = index;
-            index = loaded_15.wrapping_add(CROWD_WORKGROUP);
+                    .wrapping_add(loaded_13.wrapping_sub(instance_2 << shift));
+                if link < bounds.parent {
+                    let _block = machine.block(line!(), 2);
+                    let loaded_14 = machine.load::<CrowdLink>(Global::Links, 2 * (link as usize));
+                    walk(machine, instance_2, loaded_14);
+                }
+                let loaded_15 = index;
+                index = loaded_15.wrapping_add(CROWD_WORKGROUP);
+                let loaded_16 = index;
+                if loaded_16 >= all {
+                    break;
+                }
+            }
         }
         barrier().await;
-        let loaded_16 = level;
-        level = loaded_16.wrapping_add(1u32);
+        let loaded_17 = level;
+        level = loaded_17.wrapping_add(1u32);
     }
     let first_vector = 3u32.wrapping_mul(first).wrapping_mul(joints);
-    let idle = before_in_line(machine, first_vector);
-    let end = idle.wrapping_add(3u32.wrapping_mul(matrices));
-    next = lane;
-    loop {
-        let _block = machine.block(line!(), 9);
-        let loaded_17 = next;
-        if !(loaded_17 < end) {
-            break;
-        }
-        let loaded_18 = next;
-        if loaded_18 >= idle {
-            let _block = machine.block(line!(), 7);
-            let loaded_19 = next;
-            let loaded_20 = next;
-            let result = row_at(machine, loaded_20.wrapping_sub(idle));
-            finish_1(
-                machine,
-                first_vector.wrapping_add(loaded_19.wrapping_sub(idle)),
-                result,
+    let count = 3u32.wrapping_mul(matrices);
+    let result = before_in_line(machine, first_vector);
+    let row = lane.wrapping_sub(result);
+    let loaded_18 = machine.load::<u32>(Global::Dispatch, 13);
+    let loaded_19 = machine.load::<u32>(Global::Dispatch, 14);
+    if loaded_18 | loaded_19 == 0u32 {
+        let _block = machine.block(line!(), 4);
+        if row < count {
+            let _block = machine.block(line!(), 3);
+            let loaded_20 = machine.load::<[M::F; 4]>(Global::Rows, 4 * (row as usize));
+            machine.store::<[M::F; 4]>(
+                Global::Values,
+                4 * (first_vector.wrapping_add(row) as usize),
+                loaded_20,
             );
         }
-        let loaded_21 = next;
-        next = loaded_21.wrapping_add(CROWD_WORKGROUP);
+        next = row.wrapping_add(CROWD_WORKGROUP);
+        loop {
+            let _block = machine.block(line!(), 11);
+            let loaded_21 = next;
+            if !(loaded_21 < count) {
+                break;
+            }
+            let loaded_22 = next;
+            let loaded_23 = next;
+            let loaded_24 = machine.load::<[M::F; 4]>(Global::Rows, 4 * (loaded_23 as usize));
+            machine.store::<[M::F; 4]>(
+                Global::Values,
+                4 * (first_vector.wrapping_add(loaded_22) as usize),
+                loaded_24,
+            );
+            let loaded_25 = next;
+            next = loaded_25.wrapping_add(CROWD_WORKGROUP);
+        }
+        return;
+    }
+    if row < count {
+        let _block = machine.block(line!(), 3);
+        let result_2 = row_at(machine, row);
+        finish_1(machine, first_vector.wrapping_add(row), result_2);
+    }
+    next_2 = row.wrapping_add(CROWD_WORKGROUP);
+    loop {
+        let _block = machine.block(line!(), 11);
+        let loaded_26 = next_2;
+        if !(loaded_26 < count) {
+            break;
+        }
+        let loaded_27 = next_2;
+        let loaded_28 = next_2;
+        let result_3 = row_at(machine, loaded_28);
+        finish_1(machine, first_vector.wrapping_add(loaded_27), result_3);
+        let loaded_29 = next_2;
+        next_2 = loaded_29.wrapping_add(CROWD_WORKGROUP);
     }
 }
 
@@ -5392,14 +5497,14 @@ pub(crate) fn matrix_rows<M: Machine>(
 }
 
 pub(crate) fn motion_work<M: Machine>(machine: &M, index: u32) {
-    const OF_KERNELS: [u8; 198] = [
+    const OF_KERNELS: [u8; 199] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 2, 3, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 2, 3, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => motion_work_of_joints(machine, index),
@@ -5724,14 +5829,14 @@ pub(crate) fn moving_span<M: Machine>(
 }
 
 pub(crate) fn near_distance<M: Machine>(machine: &M, at: i32) -> M::F {
-    const OF_KERNELS: [u8; 198] = [
+    const OF_KERNELS: [u8; 199] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => near_distance_of_near_frame(machine, at),
@@ -5789,14 +5894,14 @@ pub(crate) fn parameter_in<M: Machine>(machine: &M, span: CrowdSpan<M::F>, tick:
 }
 
 pub(crate) fn parts_1<M: Machine>(machine: &M, rotation: [M::F; 4]) -> [M::F; 3] {
-    const OF_KERNELS: [u8; 198] = [
+    const OF_KERNELS: [u8; 199] = [
         0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 2, 0, 0, 0,
         0, 0, 1, 0, 2, 0, 0, 0, 0, 0, 1, 0, 2, 0, 0, 0, 0, 0, 1, 0, 2, 0, 0, 0, 0, 0, 1, 0, 0, 0,
         0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 2, 0, 0, 0, 0, 0, 1, 0,
         2, 0, 0, 0, 0, 0, 1, 0, 2, 0, 0, 0, 0, 0, 1, 0, 2, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0,
-        0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0,
+        0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0,
+        0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => parts_1_of_euler(machine, rotation),
@@ -5826,14 +5931,14 @@ pub(crate) fn parts_1_of_euler_2<M: Machine>(machine: &M, rotation: [M::F; 4]) -
 }
 
 pub(crate) fn parts_2<M: Machine>(machine: &M, rotation: [M::F; 4]) -> [M::F; 9] {
-    const OF_KERNELS: [u8; 198] = [
+    const OF_KERNELS: [u8; 199] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1,
         0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0,
         0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => parts_2_of_matrix3x3(machine, rotation),
@@ -5894,14 +5999,14 @@ pub(crate) fn parts_2_of_matrix3x3_2<M: Machine>(machine: &M, rotation: [M::F; 4
 }
 
 pub(crate) fn parts_3<M: Machine>(machine: &M, rotation: [M::F; 4]) -> [[M::F; 4]; 3] {
-    const OF_KERNELS: [u8; 198] = [
+    const OF_KERNELS: [u8; 199] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0,
         0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => parts_3_of_matrix3x4(machine, rotation),
@@ -6050,14 +6155,14 @@ pub(crate) fn polynomial<M: Machine>(machine: &M, c: [[M::F; 4]; 11], s: M::F) -
 }
 
 pub(crate) fn pose<M: Machine>(machine: &M, sample: u32) {
-    const OF_KERNELS: [u8; 198] = [
+    const OF_KERNELS: [u8; 199] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 2, 3,
         4, 5, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => pose_of_add(machine, sample),
@@ -6279,14 +6384,14 @@ pub(crate) fn pose_of_world<M: Machine>(machine: &M, sample: u32) {
 }
 
 pub(crate) fn position_at<M: Machine>(machine: &M, index: u32) -> CrowdPosition<M::F> {
-    const OF_KERNELS: [u8; 198] = [
+    const OF_KERNELS: [u8; 199] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 2, 2, 2, 2,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 2, 2, 2, 2,
     ];
     match OF_KERNELS[machine.code()] {
         0 => position_at_of_readers(machine, index),
@@ -6341,6 +6446,28 @@ pub(crate) fn position_in<M: Machine>(
         span: index | (if is_key { ON_KEY } else { 0u32 }),
         parameter: result,
     }
+}
+
+/// The smallest power of two that is not less than a number of joints, as its logarithm.
+pub(crate) fn power_from<M: Machine>(machine: &M, count: u32) -> u32 {
+    let mut bits: u32 = Default::default();
+    let _block = machine.block(line!(), 21);
+    bits = if count == 0u32 {
+        0u32
+    } else {
+        count.wrapping_sub(1u32)
+    };
+    let loaded = bits;
+    let loaded_2 = bits;
+    bits = loaded | (loaded_2 >> 1u32);
+    let loaded_3 = bits;
+    let loaded_4 = bits;
+    bits = loaded_3 | (loaded_4 >> 2u32);
+    let loaded_5 = bits;
+    let loaded_6 = bits;
+    bits = loaded_5 | (loaded_6 >> 4u32);
+    let loaded_7 = bits;
+    loaded_7.count_ones()
 }
 
 /// The Hamilton product a b.
@@ -6749,25 +6876,24 @@ pub(crate) fn rotation_step<M: Machine>(
 
 /// A row as it is stored.
 pub(crate) fn row_at<M: Machine>(machine: &M, row: u32) -> [M::F; 4] {
-    let _block = machine.block(line!(), 17);
-    let loaded = machine.load::<u32>(Global::Dispatch, 12);
+    let _block = machine.block(line!(), 16);
+    let loaded = machine.load::<u32>(Global::Dispatch, 13);
     if loaded == 0u32 {
         let _block = machine.block(line!(), 1);
         let loaded_2 = machine.load::<[M::F; 4]>(Global::Rows, 4 * (row as usize));
         return loaded_2;
     }
     let matrix = quotient(row, 3u32);
+    let instance = instance_of(machine, matrix);
     let loaded_3 = machine.load::<u32>(Global::Dispatch, 2);
-    let instance = quotient(matrix, loaded_3);
-    let loaded_4 = machine.load::<u32>(Global::Dispatch, 2);
     let first = matrix
-        .wrapping_sub(instance.wrapping_mul(loaded_4))
+        .wrapping_sub(instance.wrapping_mul(loaded_3))
         .wrapping_mul(3u32);
-    let loaded_5 = machine.load::<[M::F; 4]>(Global::Rows, 4 * (row as usize));
-    let loaded_6 = machine.load::<[M::F; 4]>(Global::Bind, 4 * (first as usize));
-    let loaded_7 = machine.load::<[M::F; 4]>(Global::Bind, 4 * (first.wrapping_add(1u32) as usize));
-    let loaded_8 = machine.load::<[M::F; 4]>(Global::Bind, 4 * (first.wrapping_add(2u32) as usize));
-    let result = row_product(machine, loaded_5, loaded_6, loaded_7, loaded_8);
+    let loaded_4 = machine.load::<[M::F; 4]>(Global::Rows, 4 * (row as usize));
+    let loaded_5 = machine.load::<[M::F; 4]>(Global::Bind, 4 * (first as usize));
+    let loaded_6 = machine.load::<[M::F; 4]>(Global::Bind, 4 * (first.wrapping_add(1u32) as usize));
+    let loaded_7 = machine.load::<[M::F; 4]>(Global::Bind, 4 * (first.wrapping_add(2u32) as usize));
+    let result = row_product(machine, loaded_4, loaded_5, loaded_6, loaded_7);
     result
 }
 
@@ -6794,14 +6920,14 @@ pub(crate) fn row_product<M: Machine>(
 }
 
 pub(crate) fn sample_at_key_sample<M: Machine>(machine: &M, index: u32) -> KeySample<M::F> {
-    const OF_KERNELS: [u8; 198] = [
+    const OF_KERNELS: [u8; 199] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => sample_at_key_sample_of_readers(machine, index),
@@ -6836,14 +6962,14 @@ pub(crate) fn sample_at_key_sample_of_readers_2<M: Machine>(
 }
 
 pub(crate) fn sample_at_listed_sample<M: Machine>(machine: &M, index: u32) -> ListedSample<M::F> {
-    const OF_KERNELS: [u8; 198] = [
+    const OF_KERNELS: [u8; 199] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => sample_at_listed_sample_of_readers(machine, index),
@@ -7023,14 +7149,14 @@ pub(crate) fn sampled<M: Machine>(
 }
 
 pub(crate) fn segment_at_arc_segment<M: Machine>(machine: &M, index: u32) -> ArcSegment<M::F> {
-    const OF_KERNELS: [u8; 198] = [
+    const OF_KERNELS: [u8; 199] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1,
-        1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1,
+        1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => segment_at_arc_segment_of_readers(machine, index),
@@ -7066,14 +7192,14 @@ pub(crate) fn segment_at_polynomial_segment<M: Machine>(
     machine: &M,
     index: u32,
 ) -> PolynomialSegment<M::F> {
-    const OF_KERNELS: [u8; 198] = [
+    const OF_KERNELS: [u8; 199] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
-        1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
+        1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => segment_at_polynomial_segment_of_readers(machine, index),
@@ -7628,14 +7754,14 @@ pub(crate) fn step_vector<M: Machine>(machine: &M, a: [M::F; 4], chord: [M::F; 4
 }
 
 pub(crate) fn store<M: Machine>(machine: &M, index: u32, rotation: [M::F; 4]) {
-    const OF_KERNELS: [u8; 198] = [
+    const OF_KERNELS: [u8; 199] = [
         0, 0, 1, 2, 3, 4, 5, 6, 1, 0, 1, 2, 3, 4, 5, 6, 1, 0, 1, 2, 3, 4, 5, 6, 1, 0, 1, 2, 3, 4,
         5, 6, 1, 0, 1, 2, 3, 4, 5, 6, 1, 0, 1, 2, 3, 4, 5, 6, 1, 0, 1, 2, 3, 4, 5, 6, 1, 0, 1, 2,
         3, 4, 5, 6, 1, 0, 1, 2, 3, 4, 5, 6, 1, 0, 1, 2, 3, 4, 5, 6, 1, 0, 1, 2, 3, 4, 5, 6, 1, 0,
         1, 2, 3, 4, 5, 6, 1, 0, 1, 2, 3, 4, 5, 6, 1, 0, 1, 2, 3, 4, 5, 6, 1, 3, 3, 3, 0, 0, 0, 0,
-        0, 0, 3, 3, 3, 3, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 3, 0, 0, 0, 0, 0, 0, 1, 2, 7, 4, 5, 6,
-        1, 0, 1, 2, 7, 4, 5, 6, 1, 0, 1, 2, 7, 4, 5, 6, 1, 0, 1, 2, 7, 4, 5, 6, 1, 0, 1, 2, 7, 4,
-        5, 6, 1, 0, 1, 2, 7, 4, 5, 6, 1, 7, 7, 7, 7, 7, 7, 7,
+        0, 0, 3, 3, 3, 3, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 3, 2, 0, 0, 0, 0, 0, 0, 1, 2, 7, 4, 5,
+        6, 1, 0, 1, 2, 7, 4, 5, 6, 1, 0, 1, 2, 7, 4, 5, 6, 1, 0, 1, 2, 7, 4, 5, 6, 1, 0, 1, 2, 7,
+        4, 5, 6, 1, 0, 1, 2, 7, 4, 5, 6, 1, 7, 7, 7, 7, 7, 7, 7,
     ];
     match OF_KERNELS[machine.code()] {
         0 => store_of_axis_angle(machine, index, rotation),
@@ -7772,14 +7898,14 @@ pub(crate) fn store_with_care<M: Machine>(
     first_j: u32,
     repetition: u32,
 ) {
-    const OF_KERNELS: [u8; 198] = [
+    const OF_KERNELS: [u8; 199] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 1, 0, 1, 1, 0, 0, 1, 0, 1, 0, 1, 1, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => store_with_care_of_alone(machine, item, location, first_j, repetition),
@@ -7950,14 +8076,14 @@ pub(crate) fn store_with_care_of_alone_2<M: Machine>(
 }
 
 pub(crate) fn tick_of<M: Machine>(machine: &M, entry: CrowdEntry, period: u32) -> u32 {
-    const OF_KERNELS: [u8; 198] = [
+    const OF_KERNELS: [u8; 199] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => tick_of_of_ticks(machine, entry, period),
@@ -8400,14 +8526,14 @@ pub(crate) fn walk<M: Machine>(machine: &M, instance: u32, link: CrowdLink) {
 }
 
 pub(crate) fn weights_at<M: Machine>(machine: &M, index: u32) -> TangentWeights<M::F> {
-    const OF_KERNELS: [u8; 198] = [
+    const OF_KERNELS: [u8; 199] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => weights_at_of_readers(machine, index),

@@ -97,7 +97,7 @@ pub(crate) const LONGEST_TANGENT_PART: f32 = 0.01;
 pub(crate) const MAX_SUBGROUP_JOINTS: u32 = 1024;
 pub(crate) const MAX_SUBGROUP_POSITIONS: u32 = 4;
 pub(crate) const MAX_WALKED: u32 = 128;
-pub(crate) const MAX_WHOLE_JOINTS: u32 = 128;
+pub(crate) const MAX_WHOLE_JOINTS: u32 = 256;
 pub(crate) const MAX_WHOLE_POSITIONS: u32 = 128;
 pub(crate) const MAY_BE_TINY: u32 = 1073741824;
 pub(crate) const MOTION_WORKGROUP: u32 = 64;
@@ -402,9 +402,11 @@ pub(crate) struct CrowdSubgroupDispatch {
     pub(crate) position_lanes: u32,
 /// 2^20 divided by the number of joints, rounded up: by it joints of a subgroup are divided among its instances.
     pub(crate) joint_share: u32,
+/// 0: the store has no options.
+    pub(crate) detail: u32,
 }
 const _: () = {
-    assert!(size_of::<CrowdSubgroupDispatch>() == 36);
+    assert!(size_of::<CrowdSubgroupDispatch>() == 40);
     assert!(std::mem::offset_of!(CrowdSubgroupDispatch, count) == 0);
     assert!(std::mem::offset_of!(CrowdSubgroupDispatch, first_instance) == 4);
     assert!(std::mem::offset_of!(CrowdSubgroupDispatch, joints) == 8);
@@ -414,6 +416,7 @@ const _: () = {
     assert!(std::mem::offset_of!(CrowdSubgroupDispatch, positions_log2) == 24);
     assert!(std::mem::offset_of!(CrowdSubgroupDispatch, position_lanes) == 28);
     assert!(std::mem::offset_of!(CrowdSubgroupDispatch, joint_share) == 32);
+    assert!(std::mem::offset_of!(CrowdSubgroupDispatch, detail) == 36);
 };
 #[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
@@ -440,6 +443,8 @@ pub(crate) struct CrowdWholeDispatch {
     pub(crate) references: u32,
 /// Instances of a workgroup. They have `MAX_WHOLE_POSITIONS` time bases and `MAX_WHOLE_JOINTS` joints at most.
     pub(crate) instances: u32,
+/// 2^20 divided by the number of joints, rounded up: by it joints of a workgroup are divided among its instances.
+    pub(crate) joint_share: u32,
 /// How many levels are walked; 0 where matrices stay in their parents' frames.
     pub(crate) levels: u32,
 /// 1 where matrices are multiplied by the inverse bind matrices, else 0.
@@ -448,7 +453,7 @@ pub(crate) struct CrowdWholeDispatch {
     pub(crate) is_half: u32,
 }
 const _: () = {
-    assert!(size_of::<CrowdWholeDispatch>() == 56);
+    assert!(size_of::<CrowdWholeDispatch>() == 60);
     assert!(std::mem::offset_of!(CrowdWholeDispatch, count) == 0);
     assert!(std::mem::offset_of!(CrowdWholeDispatch, first_instance) == 4);
     assert!(std::mem::offset_of!(CrowdWholeDispatch, joints) == 8);
@@ -460,9 +465,10 @@ const _: () = {
     assert!(std::mem::offset_of!(CrowdWholeDispatch, masks) == 32);
     assert!(std::mem::offset_of!(CrowdWholeDispatch, references) == 36);
     assert!(std::mem::offset_of!(CrowdWholeDispatch, instances) == 40);
-    assert!(std::mem::offset_of!(CrowdWholeDispatch, levels) == 44);
-    assert!(std::mem::offset_of!(CrowdWholeDispatch, is_skinning) == 48);
-    assert!(std::mem::offset_of!(CrowdWholeDispatch, is_half) == 52);
+    assert!(std::mem::offset_of!(CrowdWholeDispatch, joint_share) == 44);
+    assert!(std::mem::offset_of!(CrowdWholeDispatch, levels) == 48);
+    assert!(std::mem::offset_of!(CrowdWholeDispatch, is_skinning) == 52);
+    assert!(std::mem::offset_of!(CrowdWholeDispatch, is_half) == 56);
 };
 #[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
@@ -971,6 +977,7 @@ pub(crate) enum Kernel {
     CrowdWholeMatrices,
     CrowdPlainWholeMatrices,
     CrowdSubgroupRotations,
+    CrowdSubgroupRotationsF16,
     MotionJoints,
     MotionWalk,
     MotionDifferences,
@@ -1119,7 +1126,7 @@ impl Kernel {
         }
     }
 }
-pub(crate) static KERNELS: [KernelCode; 143] = [
+pub(crate) static KERNELS: [KernelCode; 144] = [
     KernelCode { kernel: Kernel::SelfTest, storage: ("self_test", 1946), texels: None, converting: None, bindings: &[Read, Write], segments: None, subgroups: false },
     KernelCode { kernel: Kernel::ArcFramesAxisAngle, storage: ("arc_frames_axis_angle", 2963), texels: Some(("arc_frames_axis_angle_texels", 3089)), converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::Frames, Store::AxisAngle)), subgroups: false },
     KernelCode { kernel: Kernel::ArcFramesEuler, storage: ("arc_frames_euler", 3619), texels: Some(("arc_frames_euler_texels", 3737)), converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::Frames, Store::Euler)), subgroups: false },
@@ -1253,11 +1260,12 @@ pub(crate) static KERNELS: [KernelCode; 143] = [
     KernelCode { kernel: Kernel::CrowdWalkAll, storage: ("crowd_walk_all", 1260), texels: None, converting: None, bindings: &[Read, ReadWrite], segments: None, subgroups: false },
     KernelCode { kernel: Kernel::CrowdSkin, storage: ("crowd_skin", 767), texels: None, converting: None, bindings: &[Read, ReadWrite], segments: None, subgroups: false },
     KernelCode { kernel: Kernel::CrowdHalf, storage: ("crowd_half", 777), texels: None, converting: None, bindings: &[Read, Write], segments: None, subgroups: false },
-    KernelCode { kernel: Kernel::CrowdWholeRotations, storage: ("crowd_whole_rotations", 8581), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Read, Read, Write, Write], segments: None, subgroups: false },
-    KernelCode { kernel: Kernel::CrowdPlainWholeRotations, storage: ("crowd_plain_whole_rotations", 5227), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Read, Read, Write, Write], segments: None, subgroups: false },
-    KernelCode { kernel: Kernel::CrowdWholeMatrices, storage: ("crowd_whole_matrices", 10274), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Read, Read, Read, Read, Write, Write], segments: None, subgroups: false },
-    KernelCode { kernel: Kernel::CrowdPlainWholeMatrices, storage: ("crowd_plain_whole_matrices", 6928), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Read, Read, Read, Read, Write, Write], segments: None, subgroups: false },
-    KernelCode { kernel: Kernel::CrowdSubgroupRotations, storage: ("crowd_subgroup_rotations", 4532), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Read, Read, Write], segments: None, subgroups: true },
+    KernelCode { kernel: Kernel::CrowdWholeRotations, storage: ("crowd_whole_rotations", 8639), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Read, Read, Write, Write], segments: None, subgroups: false },
+    KernelCode { kernel: Kernel::CrowdPlainWholeRotations, storage: ("crowd_plain_whole_rotations", 5294), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Read, Read, Write, Write], segments: None, subgroups: false },
+    KernelCode { kernel: Kernel::CrowdWholeMatrices, storage: ("crowd_whole_matrices", 10662), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Read, Read, Read, Read, Write, Write], segments: None, subgroups: false },
+    KernelCode { kernel: Kernel::CrowdPlainWholeMatrices, storage: ("crowd_plain_whole_matrices", 7321), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Read, Read, Read, Read, Write, Write], segments: None, subgroups: false },
+    KernelCode { kernel: Kernel::CrowdSubgroupRotations, storage: ("crowd_subgroup_rotations", 4538), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Read, Read, Write], segments: None, subgroups: true },
+    KernelCode { kernel: Kernel::CrowdSubgroupRotationsF16, storage: ("crowd_subgroup_rotations_f16", 4786), texels: None, converting: Some(("crowd_subgroup_rotations_f16_converting", 4619)), bindings: &[Read, Read, Read, Read, Read, Read, Write], segments: None, subgroups: true },
     KernelCode { kernel: Kernel::MotionJoints, storage: ("motion_joints", 8600), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Read, Read, Write], segments: None, subgroups: false },
     KernelCode { kernel: Kernel::MotionWalk, storage: ("motion_walk", 3912), texels: None, converting: None, bindings: &[Read, ReadWrite], segments: None, subgroups: false },
     KernelCode { kernel: Kernel::MotionDifferences, storage: ("motion_differences", 3595), texels: None, converting: None, bindings: &[Read, ReadWrite], segments: None, subgroups: false },

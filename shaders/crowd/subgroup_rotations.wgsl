@@ -22,6 +22,8 @@ struct CrowdSubgroupDispatch {
     position_lanes: u32,
     /// 2^20 divided by the number of joints, rounded up: by it joints of a subgroup are divided among its instances.
     joint_share: u32,
+    /// 0: the store has no options.
+    detail: u32,
 }
 
 // A position has two lanes or more, of at least eight.

@@ -26,6 +26,8 @@ struct CrowdWholeDispatch {
     references: u32,
     /// Instances of a workgroup. They have `MAX_WHOLE_POSITIONS` time bases and `MAX_WHOLE_JOINTS` joints at most.
     instances: u32,
+    /// 2^20 divided by the number of joints, rounded up: by it joints of a workgroup are divided among its instances.
+    joint_share: u32,
     /// How many levels are walked; 0 where matrices stay in their parents' frames.
     levels: u32,
     /// 1 where matrices are multiplied by the inverse bind matrices, else 0.
@@ -34,9 +36,9 @@ struct CrowdWholeDispatch {
     is_half: u32,
 }
 
-// Memory of a workgroup: 1 KiB of positions, and where there are matrices 6 KiB of them. Vulkan promises 16.
+// Memory of a workgroup: 1 KiB of positions, and where there are matrices 12 KiB of them. Vulkan promises 16.
 const MAX_WHOLE_POSITIONS: u32 = 128;
-const MAX_WHOLE_JOINTS: u32 = 128;
+const MAX_WHOLE_JOINTS: u32 = 256;
 
 // Vectors of four numbers that begin where a line of 128 bytes does, in f32.
 const LINE_VECTORS: u32 = 8;
@@ -72,6 +74,11 @@ fn instances_from(first: u32) -> u32 {
     first_entry = first * dispatch.layers;
     let rest = dispatch.count - first;
     return select(dispatch.instances, rest, rest < dispatch.instances);
+}
+
+// The instance of a joint, of those of all instances of the workgroup.
+fn instance_of(index: u32) -> u32 {
+    return (index * dispatch.joint_share) >> 20u;
 }
 
 // Finds the position in a time base of a layer of the workgroup's instances, as `crowd/times` does.

@@ -26,28 +26,60 @@ fn main(
     let joints = dispatch.joints;
     let matrices = instances * joints;
     for (var matrix = lane; matrix < matrices; matrix += CROWD_WORKGROUP) {
-        let instance = matrix / joints;
+        let instance = instance_of(matrix);
         transform_joint(instance, matrix - instance * joints);
     }
     workgroupBarrier();
     for (var level = 0u; level < dispatch.levels; level++) {
         // Where the level begins, and where it ends.
         let bounds = links[dispatch.first_link + level];
-        let in_level = bounds.parent - bounds.joint;
-        for (var index = lane; index < instances * in_level; index += CROWD_WORKGROUP) {
-            let instance = index / in_level;
-            walk(instance, links[bounds.joint + (index - instance * in_level)]);
+        // Its joints in each instance, up to a power of two.
+        let shift = power_from(bounds.parent - bounds.joint);
+        let all = instances << shift;
+        var index = lane;
+        if index < all {
+            loop {
+                let instance = index >> shift;
+                let link = bounds.joint + (index - (instance << shift));
+                if link < bounds.parent {
+                    walk(instance, links[link]);
+                }
+                index += CROWD_WORKGROUP;
+                continuing {
+                    break if index >= all;
+                }
+            }
         }
         workgroupBarrier();
     }
     let first_vector = 3u * first * joints;
-    let idle = before_in_line(first_vector);
-    let end = idle + 3u * matrices;
-    for (var next = lane; next < end; next += CROWD_WORKGROUP) {
-        if next >= idle {
-            finish(first_vector + (next - idle), row_at(next - idle));
+    let count = 3u * matrices;
+    // The first invocations are idle once, if the others can so store whole lines: their rows wrap to large numbers.
+    let row = lane - before_in_line(first_vector);
+    if (dispatch.is_skinning | dispatch.is_half) == 0u {
+        if row < count {
+            values[first_vector + row] = rows[row];
         }
+        for (var next = row + CROWD_WORKGROUP; next < count; next += CROWD_WORKGROUP) {
+            values[first_vector + next] = rows[next];
+        }
+        return;
     }
+    if row < count {
+        finish(first_vector + row, row_at(row));
+    }
+    for (var next = row + CROWD_WORKGROUP; next < count; next += CROWD_WORKGROUP) {
+        finish(first_vector + next, row_at(next));
+    }
+}
+
+// The smallest power of two that is not less than a number of joints, as its logarithm.
+fn power_from(count: u32) -> u32 {
+    var bits = select(count - 1u, 0u, count == 0u);
+    bits = bits | (bits >> 1u);
+    bits = bits | (bits >> 2u);
+    bits = bits | (bits >> 4u);
+    return countOneBits(bits);
 }
 
 // Evaluates a joint in its parent's frame.
@@ -79,7 +111,7 @@ fn row_at(row: u32) -> vec4f {
         return rows[row];
     }
     let matrix = row / 3u;
-    let instance = matrix / dispatch.joints;
+    let instance = instance_of(matrix);
     let first = (matrix - instance * dispatch.joints) * 3u;
     return row_product(rows[row], bind[first], bind[first + 1u], bind[first + 2u]);
 }

@@ -24,7 +24,7 @@ fn main(
     for (var next = lane; next < end; next += CROWD_WORKGROUP) {
         if next >= idle {
             let index = next - idle;
-            let instance = index / joints;
+            let instance = instance_of(index);
             finish(first_vector + index, layered(instance, index - instance * joints, ROTATION));
         }
     }

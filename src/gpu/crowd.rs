@@ -423,15 +423,18 @@ mod tests {
         for crowd in crowd(Mapping::Samples, 128, 1, false) {
             let on_device = VulkanCrowd::of(&**crowd.device.as_ref().unwrap()).unwrap();
             let lanes = on_device.device.engine.device.physical.subgroup_lanes;
-            let by_subgroups = ["crowd_subgroup_rotations"];
-            let by_workgroups = ["crowd_plain_whole_rotations"];
-            let expected = if lanes.is_some() {
-                by_subgroups
-            } else {
-                by_workgroups
-            };
-            assert_eq!(kernels(&crowd, Rotations.into()), expected);
-            assert_eq!(kernels(&crowd, CrowdOutput::half(Rotations)), by_workgroups);
+            let by_subgroups = ["crowd_subgroup_rotations", "crowd_subgroup_rotations_f16"];
+            for (output, by_subgroups) in [CrowdOutput::from, CrowdOutput::half]
+                .map(|output| output(Rotations))
+                .into_iter()
+                .zip(by_subgroups)
+            {
+                let expected = match lanes.is_some() {
+                    true => by_subgroups,
+                    false => "crowd_plain_whole_rotations",
+                };
+                assert_eq!(kernels(&crowd, output), [expected]);
+            }
             for output in [CrowdOutput::from, CrowdOutput::half] {
                 for values in [Local, Model, Skinning] {
                     let matrices = ["crowd_plain_whole_matrices"];
@@ -451,37 +454,53 @@ mod tests {
     #[test]
     fn a_kernel_by_subgroups_that_differs_is_replaced() {
         use crate::gpu::pipeline::faults::MISCOMPILED;
-        let kernel = Kernel::CrowdSubgroupRotations;
-        let output = CrowdOutput::from(CrowdValues::Rotations);
-        MISCOMPILED.set(Some(kernel));
-        for mut crowd in crowd(Mapping::Samples, 128, 1, false) {
-            let on_device = VulkanCrowd::of(&**crowd.device.as_ref().unwrap()).unwrap();
-            let engine = Arc::clone(&on_device.device.engine);
-            if engine.device.physical.subgroup_lanes.is_none() {
-                continue;
+        let rotations = CrowdValues::Rotations;
+        for (kernel, name, output) in [
+            (
+                Kernel::CrowdSubgroupRotations,
+                "crowd_subgroup_rotations",
+                CrowdOutput::from(rotations),
+            ),
+            (
+                Kernel::CrowdSubgroupRotationsF16,
+                "crowd_subgroup_rotations_f16",
+                CrowdOutput::half(rotations),
+            ),
+        ] {
+            MISCOMPILED.set(Some(kernel));
+            for mut crowd in crowd(Mapping::Samples, 128, 1, false) {
+                let on_device = VulkanCrowd::of(&**crowd.device.as_ref().unwrap()).unwrap();
+                let engine = Arc::clone(&on_device.device.engine);
+                if engine.device.physical.subgroup_lanes.is_none() {
+                    continue;
+                }
+                let of_workgroups = ["crowd_plain_whole_rotations"];
+                assert_eq!(kernels(&crowd, output), of_workgroups);
+                let known = engine.known_kernels();
+                let replaced = Vec::from_iter(known.iter().filter(|check| check.replaced));
+                let [check] = &replaced[..] else {
+                    panic!("{replaced:?}");
+                };
+                assert_eq!(check.name.trim_end_matches("_converting"), name);
+                assert!(check.differing > 0 && check.differing <= check.total);
+                let cpu = Engine::new(Device::Cpu).unwrap();
+                let mut on_cpu = cpu.crowd(crowd.library(), 1, 1).unwrap();
+                if output.is_half {
+                    let mut halves = vec![[0u16; 4]; crowd.output_len(output)];
+                    let mut expected = halves.clone();
+                    crowd.evaluate_half_into(rotations, &mut halves).unwrap();
+                    (on_cpu.evaluate_half_into(rotations, &mut expected)).unwrap();
+                    assert_eq!(halves, expected);
+                } else {
+                    let mut values = vec![[0.0; 4]; crowd.output_len(output)];
+                    let mut expected = values.clone();
+                    crowd.evaluate_into(rotations, &mut values).unwrap();
+                    on_cpu.evaluate_into(rotations, &mut expected).unwrap();
+                    assert_eq!(values, expected);
+                }
             }
-            let of_workgroups = ["crowd_plain_whole_rotations"];
-            assert_eq!(kernels(&crowd, output), of_workgroups);
-            let known = engine.known_kernels();
-            let replaced = Vec::from_iter(known.iter().filter(|check| check.replaced));
-            let [check] = &replaced[..] else {
-                panic!("{replaced:?}");
-            };
-            assert_eq!(check.name, "crowd_subgroup_rotations");
-            assert!(check.differing > 0 && check.differing <= check.total);
-            let mut rotations = vec![[0.0; 4]; crowd.output_len(output)];
-            crowd
-                .evaluate_into(CrowdValues::Rotations, &mut rotations)
-                .unwrap();
-            let cpu = Engine::new(Device::Cpu).unwrap();
-            let mut on_cpu = cpu.crowd(crowd.library(), 1, 1).unwrap();
-            let mut expected = vec![[0.0; 4]; rotations.len()];
-            on_cpu
-                .evaluate_into(CrowdValues::Rotations, &mut expected)
-                .unwrap();
-            assert_eq!(rotations, expected);
+            MISCOMPILED.set(None);
         }
-        MISCOMPILED.set(None);
     }
 
     #[test]
@@ -492,7 +511,7 @@ mod tests {
             let [times, locals] = ["crowd_times", "crowd_plain_locals"];
             [times, locals, walk, "crowd_skin", "crowd_half"]
         };
-        for crowd in crowd(Mapping::Samples, 129, 1, false) {
+        for crowd in crowd(Mapping::Samples, 257, 1, false) {
             assert_eq!(kernels(&crowd, skinning), steps("crowd_walk"));
         }
         // Skeletons with as many time bases as joints.

@@ -1,6 +1,7 @@
 //! Twin of `shaders/crowd/cubic.wgsl`, `shaders/crowd/sampled.wgsl`, `shaders/crowd/layer_value.wgsl`,
-//! `shaders/crowd/layers.wgsl`, `shaders/crowd/plain.wgsl`, `shaders/crowd/plain_arc.wgsl` and `shaders/crowd/rotations.wgsl`: the same names, the
-//! same order.
+//! `shaders/crowd/layers.wgsl`, `shaders/crowd/plain.wgsl`, `shaders/crowd/plain_arc.wgsl`,
+//! `shaders/crowd/plain_cubic.wgsl`, `shaders/crowd/cubic_or_constant.wgsl` and `shaders/crowd/rotations.wgsl`: the same
+//! names, the same order.
 
 use glam::Vec4;
 

@@ -74,7 +74,7 @@ impl WholeKernel {
 
     fn kernel(&self) -> Kernel {
         match self {
-            Self::Subgroups(_) => SubgroupInstances::KERNEL,
+            Self::Subgroups(whole) => whole.kernel(),
             Self::Workgroups(whole) => whole.kernel,
         }
     }
@@ -398,7 +398,7 @@ impl CrowdResources {
             | Kernel::CrowdPlainRotations
             | Kernel::CrowdLocals
             | Kernel::CrowdPlainLocals => (&[entries, channels, cells, positions], &[values]),
-            Kernel::CrowdSubgroupRotations => {
+            Kernel::CrowdSubgroupRotations | Kernel::CrowdSubgroupRotationsF16 => {
                 (&[entries, clips, bases, spans, channels, cells], &[output])
             }
             // Over whole instances: the result is bound in both precisions.

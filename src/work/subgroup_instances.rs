@@ -6,6 +6,7 @@ use crate::shader::{
     CROWD_WORKGROUP, CrowdDispatch, CrowdSubgroupDispatch, Kernel, LINE_VECTORS,
     MAX_SUBGROUP_JOINTS, MAX_SUBGROUP_POSITIONS,
 };
+use crate::work::whole_instances::joint_share;
 
 /// How the instances of a crowd are evaluated by subgroups, for one output.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -14,13 +15,13 @@ pub(crate) struct SubgroupInstances {
     instances_log2: u32,
     /// Lanes of a subgroup.
     lanes: u32,
+    /// Whether values are stored in half precision.
+    is_half: bool,
 }
 
 impl SubgroupInstances {
-    pub(crate) const KERNEL: Kernel = Kernel::CrowdSubgroupRotations;
-
-    /// For rotations in 32 bits, of one layer of arcs each, of which some instances fill whole lines of memory. Their
-    /// times take about as long as the joints of one instance, so a subgroup has as many instances as it has room for.
+    /// For rotations of one layer of arcs each, of which some instances fill whole lines of memory. Their times take
+    /// about as long as the joints of one instance, so a subgroup has as many instances as it has room for.
     pub(crate) fn new(
         arguments: &CrowdDispatch,
         output: CrowdOutput,
@@ -32,15 +33,22 @@ impl SubgroupInstances {
             let all = joints << instances_log2;
             bases << instances_log2 <= MAX_SUBGROUP_POSITIONS
                 && all <= MAX_SUBGROUP_JOINTS
-                && all.is_multiple_of(LINE_VECTORS)
+                && all.is_multiple_of(LINE_VECTORS << u32::from(output.is_half))
         };
-        let is_stored_alike = output == CrowdOutput::from(CrowdValues::Rotations);
         let largest = MAX_SUBGROUP_POSITIONS.ilog2();
         let instances_log2 = (0..=largest).rev().find(fits)?;
-        (is_plain && is_stored_alike).then_some(Self {
+        (is_plain && output.values == CrowdValues::Rotations).then_some(Self {
             instances_log2,
             lanes,
+            is_half: output.is_half,
         })
+    }
+
+    pub(crate) fn kernel(self) -> Kernel {
+        match self.is_half {
+            true => Kernel::CrowdSubgroupRotationsF16,
+            false => Kernel::CrowdSubgroupRotations,
+        }
     }
 
     /// The arguments of a dispatch over as many instances as `arguments` counts, and how many workgroups it has.
@@ -53,7 +61,6 @@ impl SubgroupInstances {
 
     /// The arguments of a dispatch whose subgroups take so many instances, as a power of two.
     pub(crate) fn pushed(instances_log2: u32, arguments: &CrowdDispatch) -> CrowdSubgroupDispatch {
-        const SHARE_BITS: u32 = 20;
         let positions = (arguments.bases << instances_log2).next_power_of_two();
         CrowdSubgroupDispatch {
             count: arguments.count,
@@ -65,7 +72,8 @@ impl SubgroupInstances {
             positions_log2: positions.ilog2(),
             // A mask in which every bit at a multiple of `positions` is set.
             position_lanes: u32::MAX / ((1 << positions) - 1),
-            joint_share: (1u32 << SHARE_BITS).div_ceil(arguments.joints),
+            joint_share: joint_share(arguments.joints),
+            detail: 0,
         }
     }
 }
@@ -102,14 +110,28 @@ mod tests {
         assert_eq!(instances(60, 3), None);
         assert_eq!(instances(64, 5), None);
         assert_eq!(instances(1032, 1), None);
+        // In half precision, a line has twice as many values.
+        let half = CrowdOutput::half(CrowdValues::Rotations);
+        let of_half = |joints| SubgroupInstances::new(&arguments(joints, 1), half, true, 32);
+        assert_eq!(of_half(60).map(|found| found.instances_log2), Some(2));
+        assert_eq!(of_half(2), None);
     }
 
     #[test]
     fn other_outputs_have_other_kernels() {
         let of = |output, is_plain| SubgroupInstances::new(&arguments(60, 1), output, is_plain, 32);
         let rotations = CrowdOutput::from(CrowdValues::Rotations);
-        assert!(of(rotations, true).is_some() && of(rotations, false).is_none());
-        assert_eq!(of(CrowdOutput::half(CrowdValues::Rotations), true), None);
+        let half = CrowdOutput::half(CrowdValues::Rotations);
+        let kernel = |output| of(output, true).map(|found| found.kernel() as usize);
+        assert_eq!(
+            kernel(rotations),
+            Some(Kernel::CrowdSubgroupRotations as usize)
+        );
+        assert_eq!(
+            kernel(half),
+            Some(Kernel::CrowdSubgroupRotationsF16 as usize)
+        );
+        assert!(of(rotations, false).is_none() && of(half, false).is_none());
         assert_eq!(of(CrowdValues::Local.into(), true), None);
     }
 

@@ -39,6 +39,8 @@ impl WholeInstances {
         } = *arguments;
         let is_rotations = output.values == CrowdValues::Rotations;
         let room = (MAX_WHOLE_JOINTS / joints).min(MAX_WHOLE_POSITIONS / (layers * bases));
+        // Joints of a level are divided among instances by bits, so those of matrices are a power of two.
+        let is_divided = |instances: &u32| is_rotations || instances.is_power_of_two();
         // The number of iterations of a workgroup over its joints. Rotations are stored immediately. They may begin
         // within a line; then the invocations before them are idle.
         let line = LINE_VECTORS << u32::from(output.is_half);
@@ -48,8 +50,9 @@ impl WholeInstances {
             let idle = if fills_lines { 0 } else { line - 1 };
             (joints + idle).div_ceil(CROWD_WORKGROUP)
         };
-        let instances =
-            (1..=room).min_by(|&a, &b| (rounds(a) * b).cmp(&(rounds(b) * a)).then(b.cmp(&a)))?;
+        let instances = (1..=room)
+            .filter(is_divided)
+            .min_by(|&a, &b| (rounds(a) * b).cmp(&(rounds(b) * a)).then(b.cmp(&a)))?;
         Some(Self {
             kernel: match (is_rotations, is_plain) {
                 (true, true) => Kernel::CrowdPlainWholeRotations,
@@ -84,6 +87,7 @@ impl WholeInstances {
             masks: arguments.masks,
             references: arguments.references,
             instances: self.instances,
+            joint_share: joint_share(arguments.joints),
             levels: if walks { level_count as u32 } else { 0 },
             is_skinning: (self.output.values == Skinning).into(),
             is_half: self.output.is_half.into(),
@@ -92,11 +96,18 @@ impl WholeInstances {
     }
 }
 
+/// The factor by which kernels divide joints among instances of so many joints: 2^20 divided by their number, rounded up.
+pub(crate) fn joint_share(joints: u32) -> u32 {
+    const SHARE_BITS: u32 = 20;
+    (1u32 << SHARE_BITS).div_ceil(joints)
+}
+
 #[cfg(test)]
 mod tests {
     use bytemuck::Zeroable as _;
 
     use super::*;
+    use crate::shader::MAX_SUBGROUP_JOINTS;
 
     fn instances(joints: u32, positions: [u32; 2], output: CrowdOutput) -> Option<u32> {
         let [layers, bases] = positions;
@@ -117,27 +128,41 @@ mod tests {
         let rotations = CrowdOutput::from(CrowdValues::Rotations);
         for (joints, of_matrices, of_rotations) in [
             (1, 128, 128),
-            (7, 18, 17),
-            (20, 6, 6),
-            (21, 6, 5),
-            (60, 2, 2),
-            (64, 2, 2),
-            (65, 1, 1),
-            (128, 1, 1),
+            (7, 32, 35),
+            (20, 8, 12),
+            (21, 8, 11),
+            (60, 4, 4),
+            (64, 4, 4),
+            (65, 2, 3),
+            (128, 2, 2),
+            (129, 1, 1),
+            (256, 1, 1),
         ] {
             assert_eq!(instances(joints, [1, 1], matrices), Some(of_matrices));
             assert_eq!(instances(joints, [1, 1], rotations), Some(of_rotations));
         }
-        // In half precision, a line has twice as many values, and 20 × 6 values end within a line.
+        // In half precision, a line has twice as many values, and 7 × 35 values and 15 idle ones are too many.
         let half = CrowdOutput::half(CrowdValues::Rotations);
-        assert_eq!(instances(20, [1, 1], half), Some(5));
+        assert_eq!(instances(7, [1, 1], half), Some(34));
+    }
+
+    /// Every joint of a workgroup or of a subgroup finds its instance by a product.
+    #[test]
+    fn joints_are_divided_among_instances() {
+        for joints in 1..=MAX_SUBGROUP_JOINTS {
+            let share = joint_share(joints);
+            let all = joints.max(MAX_SUBGROUP_JOINTS / joints * joints);
+            for index in [0, joints - 1, joints, all - 1, all / 2] {
+                assert_eq!((index * share) >> 20, index / joints, "{index}, {joints}");
+            }
+        }
     }
 
     #[test]
     fn large_instances_are_not_evaluated_as_wholes() {
         for values in CrowdValues::ALL {
             let output = CrowdOutput::from(values);
-            assert_eq!(instances(129, [1, 1], output), None);
+            assert_eq!(instances(257, [1, 1], output), None);
             assert_eq!(instances(1, [4, 32], output), Some(1));
             assert_eq!(instances(1, [4, 33], output), None);
         }

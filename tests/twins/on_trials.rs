@@ -314,8 +314,11 @@ fn positions_of_crowds() {
 /// With any number of lanes.
 #[test]
 fn rotations_of_crowds_by_subgroups() {
-    let kernel = Kernel::CrowdSubgroupRotations;
-    assert_is(kernel, |trial| {
+    let [of_words, of_halves] = [
+        Kernel::CrowdSubgroupRotations,
+        Kernel::CrowdSubgroupRotationsF16,
+    ];
+    let rotations = |trial: &Trial| -> Vec<[f32; 4]> {
         let pushed = trial.pushed::<CrowdSubgroupDispatch>();
         let clock = u64::from(pushed.clock_low) | u64::from(pushed.clock_high) << 32;
         let (entries, clips) = (trial.input::<CrowdEntry>(0), trial.input::<CrowdClip>(1));
@@ -341,13 +344,20 @@ fn rotations_of_crowds_by_subgroups() {
         let joints = 0..pushed.count * pushed.joints;
         let rotation = |i| layers.layered(i / pushed.joints, i % pushed.joints, ROTATION);
         joints.map(rotation).collect()
+    };
+    assert_is(of_words, rotations);
+    assert_is(of_halves, |trial| {
+        let rotations = rotations(trial).into_iter();
+        rotations.map(|value| value.map(to_any_half)).collect()
     });
-    for trial in trials(kernel, &mut Random::canonical()) {
-        let expected = trial.expected(kernel);
-        for lanes in [8, 16, 64] {
-            let memory = trial.memory(kernel).with_subgroups_of(lanes);
-            memory.run::<f32, ()>(trial.groups, |_| ());
-            assert_eq!(memory.into_output(), expected, "{lanes} lanes");
+    for kernel in [of_words, of_halves] {
+        for trial in trials(kernel, &mut Random::canonical()) {
+            let expected = trial.expected(kernel);
+            for lanes in [8, 16, 64] {
+                let memory = trial.memory(kernel).with_subgroups_of(lanes);
+                memory.run::<f32, ()>(trial.groups, |_| ());
+                assert_eq!(memory.into_output(), expected, "{lanes} lanes");
+            }
         }
     }
 }

@@ -134,7 +134,8 @@ pub(crate) fn trials(kernel: Kernel, random: &mut Random) -> Vec<Trial> {
         | Kernel::CrowdPlainWholeRotations
         | Kernel::CrowdWholeMatrices
         | Kernel::CrowdPlainWholeMatrices
-        | Kernel::CrowdSubgroupRotations => whole_instances::trials(kernel, random),
+        | Kernel::CrowdSubgroupRotations
+        | Kernel::CrowdSubgroupRotationsF16 => whole_instances::trials(kernel, random),
         Kernel::MotionJoints
         | Kernel::MotionWalk
         | Kernel::MotionDifferences

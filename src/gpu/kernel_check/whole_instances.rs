@@ -9,6 +9,7 @@ use crate::shader::{
 };
 use crate::twin::crowd_matrices::Rows;
 use crate::work::subgroup_instances::SubgroupInstances;
+use crate::work::whole_instances::joint_share;
 
 use bytemuck::Zeroable as _;
 
@@ -19,16 +20,19 @@ use super::crowd::{
 use super::random::Random;
 use super::{Trial, bytes};
 
-/// Instances of the window, and those of a workgroup: so many that an invocation has several joints, and several
-/// time bases.
-const INSTANCES: u32 = 26;
-const OF_WORKGROUP: u32 = 10;
+/// Instances of the window, and those of a workgroup: a power of two, and so many that an invocation has several joints,
+/// and several time bases.
+const INSTANCES: u32 = 38;
+const OF_WORKGROUP: u32 = 16;
 const CLOCK: u64 = 0x00ab_cdef_0123_4567;
 
 pub(super) fn trials(kernel: Kernel, random: &mut Random) -> Vec<Trial> {
     use CrowdValues::{Local, Model, Rotations, Skinning};
-    if kernel == Kernel::CrowdSubgroupRotations {
-        // Two instances (with two time bases) and a single one, for the smallest subgroup size.
+    if matches!(
+        kernel,
+        Kernel::CrowdSubgroupRotations | Kernel::CrowdSubgroupRotationsF16
+    ) {
+        // Two instances with two time bases, and one of them, for subgroups with the fewest lanes.
         return [2, 1]
             .map(|instances| of_subgroups(random, instances))
             .into();
@@ -210,6 +214,7 @@ impl WholeScene {
             masks,
             references,
             instances: OF_WORKGROUP,
+            joint_share: joint_share(JOINTS),
             levels: if walks { LEVELS.len() as u32 } else { 0 },
             is_skinning: (output.values == CrowdValues::Skinning).into(),
             is_half: output.is_half.into(),

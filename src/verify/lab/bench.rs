@@ -13,6 +13,7 @@ use crate::gpu::submission::Submission;
 use crate::machine::error::VulkanError;
 use crate::machine::options::RunLanes;
 use crate::output::encoding::Encoding;
+use crate::output::rotations::Layout;
 use crate::shader::{Form, IS_CONSTANT, Kernel, NO_KEY, Spread, SpreadRun, Variants};
 use crate::verify::lab::rules::{self, Timed};
 use crate::verify::lab::variant::{KernelVariant, LabKernel, RunList};
@@ -51,15 +52,35 @@ const OF_SOFTWARE: Effort = Effort {
     workgroups: ("64 workgroups that end at once", 64),
 };
 
-/// The runs that are measured, the most typical first: samples, and whether each begins with a key.
-const RUNS: [(u32, bool); 7] = [
-    (48, false),
-    (48, true),
-    (16, false),
-    (200, false),
-    (8, false),
-    (4, false),
-    (16, true),
+/// Runs that are measured together.
+#[derive(Clone, Copy)]
+struct RunShape {
+    layout: Layout,
+    samples: u32,
+    /// Whether each begins with a key.
+    has_keys: bool,
+}
+
+const fn shape(layout: Layout, samples: u32, has_keys: bool) -> RunShape {
+    RunShape {
+        layout,
+        samples,
+        has_keys,
+    }
+}
+
+/// The runs that are measured, the most typical first.
+const RUNS: [RunShape; 10] = [
+    shape(Layout::TrackMajor, 48, false),
+    shape(Layout::FrameMajor, 48, false),
+    shape(Layout::TrackMajor, 48, true),
+    shape(Layout::TrackMajor, 16, false),
+    shape(Layout::TrackMajor, 200, false),
+    shape(Layout::FrameMajor, 200, false),
+    shape(Layout::TrackMajor, 8, false),
+    shape(Layout::TrackMajor, 4, false),
+    shape(Layout::TrackMajor, 16, true),
+    shape(Layout::FrameMajor, 16, false),
 ];
 
 /// Segments that runs share in turn, more than a cache has.
@@ -69,8 +90,9 @@ const SEGMENTS: u32 = 1 << 20;
 const TRACK_SAMPLES: u32 = 1200;
 const LISTED_TRACKS: u32 = 4;
 
-/// The repetitions that are compared with twins.
+/// The repetitions that are compared with twins; frame by frame, the tracks and those of their result.
 const REPETITIONS: u32 = 3;
+const COMPARED_TRACKS: [u32; 2] = [11, 13];
 
 /// The lanes whose numbers decide for a class of runs.
 const LANES: [u32; 4] = [4, 8, 16, 32];
@@ -176,10 +198,10 @@ impl Bench<'_> {
 
     /// The variants of a kernel. Software devices take a tenth of a second for a pipeline: they have as few as have all
     /// workgroups and both kinds of stores, and those that the rules compare.
-    fn variants(&self, kernel: LabKernel, lanes: u32) -> Vec<KernelVariant> {
+    fn variants(&self, kernel: LabKernel, layout: Layout, lanes: u32) -> Vec<KernelVariant> {
         let physical = &self.engine.device.physical;
         let largest = physical.info.max_compute_work_group_invocations;
-        let mut all = kernel.variants(lanes, physical.converts_halves, largest);
+        let mut all = kernel.variants(layout, lanes, physical.converts_halves, largest);
         let cached = all[0].cached();
         all.retain(|variant| !self.is_software || variant.is_typical() || *variant == cached);
         all
@@ -205,27 +227,45 @@ impl Bench<'_> {
         Ok(made)
     }
 
+    /// The tracks of a measured result.
+    fn tracks(&self) -> u32 {
+        self.effort.samples / TRACK_SAMPLES
+    }
+
+    /// The engine's lanes of these tracks, frame by frame.
+    fn track_lanes(&self) -> u32 {
+        let tracks = self.tracks();
+        SpreadLanes::of_tracks(tracks, TRACK_SAMPLES, tracks).lanes()
+    }
+
     /// Compares every variant of every kernel with the kernel's twin, word for word.
     fn compare(&mut self) -> Result<(), VulkanError> {
         for lab_kernel in LabKernel::all() {
             let LabKernel { form, encoding } = lab_kernel;
             let kernel = lab_kernel.kernel();
+            let [tracks, stride] = COMPARED_TRACKS;
             let trial = |lanes, list| {
                 let repetitions = match list {
                     RunList::EachTrack => 1,
                     RunList::Shared => REPETITIONS,
+                    RunList::Tracks => tracks,
                 };
                 spread_trial((form, encoding), lanes, repetitions)
             };
-            let [each, shared] = [RunList::EachTrack, RunList::Shared]
-                .map(|list| trial(SpreadLanes::new(3), list).expected(kernel));
-            for variant in self.variants(lab_kernel, 8) {
+            let each = trial(SpreadLanes::new(3), RunList::EachTrack).expected(kernel);
+            let shared = trial(SpreadLanes::new(3), RunList::Shared).expected(kernel);
+            let of_tracks = SpreadLanes::with_tracks(3, stride);
+            let of_tracks = trial(of_tracks, RunList::Tracks).expected(kernel);
+            let by_track = self.variants(lab_kernel, Layout::TrackMajor, 8);
+            let by_frame = self.variants(lab_kernel, Layout::FrameMajor, self.track_lanes());
+            for variant in by_track.into_iter().chain(by_frame) {
                 let pipeline = self.pipeline(kernel, variant)?;
                 let expected = match variant.list {
                     RunList::EachTrack => each.clone(),
                     RunList::Shared => shared.clone(),
+                    RunList::Tracks => of_tracks.clone(),
                 };
-                let trial = trial(variant.spread_lanes(), variant.list);
+                let trial = trial(variant.spread_lanes(stride), variant.list);
                 let [differing, words] = trial.differing_from(expected, &pipeline)?;
                 self.report.variants_compared += 1;
                 self.report.words_compared += words as u64;
@@ -320,8 +360,8 @@ impl Bench<'_> {
         Buffer::new(&self.engine.device, "tumble lab", bytes, Residence::Results)
     }
 
-    /// Lists runs that follow each other, for some lanes and a workgroup: all, or those of a few tracks, which are
-    /// repeated.
+    /// Lists runs that follow each other, for some lanes and a workgroup: all, or those of a few tracks or of one, which
+    /// are repeated.
     fn listed(
         &self,
         run: SpreadRun,
@@ -340,12 +380,26 @@ impl Bench<'_> {
                 TRACK_SAMPLES,
                 TRACK_SAMPLES * LISTED_TRACKS,
                 RunRepetitions {
-                    count: self.effort.samples / TRACK_SAMPLES / LISTED_TRACKS,
+                    count: self.tracks() / LISTED_TRACKS,
                     segments: runs_of_track * LISTED_TRACKS,
                     constants: 0,
                     outputs: TRACK_SAMPLES * LISTED_TRACKS,
                 },
             ),
+            RunList::Tracks => (
+                TRACK_SAMPLES,
+                TRACK_SAMPLES,
+                RunRepetitions {
+                    count: self.tracks(),
+                    segments: runs_of_track,
+                    constants: 0,
+                    outputs: 1,
+                },
+            ),
+        };
+        let stride = match list {
+            RunList::EachTrack | RunList::Shared => 1,
+            RunList::Tracks => self.tracks(),
         };
         let mut chunk = WorkChunk::default();
         let mut output = 0;
@@ -358,7 +412,7 @@ impl Bench<'_> {
                 } else {
                     source
                 },
-                output,
+                output: output * stride,
                 count: count | run.count,
                 ..run
             });
@@ -377,8 +431,7 @@ impl Bench<'_> {
 
     /// Whether the segments are enough for runs of so many samples in a list of a kind.
     fn has_segments(&self, run: u32, list: RunList) -> bool {
-        let tracks = u64::from(self.effort.samples / TRACK_SAMPLES);
-        let needed = tracks * u64::from(TRACK_SAMPLES.div_ceil(run));
+        let needed = u64::from(self.tracks()) * u64::from(TRACK_SAMPLES.div_ceil(run));
         list == RunList::EachTrack || needed <= u64::from(SEGMENTS.min(self.effort.samples / 4))
     }
 
@@ -394,9 +447,12 @@ impl Bench<'_> {
         // For each class of runs and each number of lanes: the times of all kernels, relative to the engine's present
         // variant.
         let mut shares: [Vec<[Timed; 4]>; 5] = Default::default();
-        for (run, has_keys) in RUNS {
-            let class = RunLanes::class(1, u64::from(run));
-            let today_lanes = self.engine.run_lanes.of_class(class);
+        for shape in RUNS {
+            let class = RunLanes::class(1, u64::from(shape.samples));
+            let today_lanes = match shape.layout {
+                Layout::TrackMajor => self.engine.run_lanes.of_class(class),
+                Layout::FrameMajor => self.track_lanes(),
+            };
             let mut lists: Vec<ListedRuns> = Vec::new();
             for lab_kernel in LabKernel::all() {
                 if self.is_over() {
@@ -407,7 +463,6 @@ impl Bench<'_> {
                     &of_forms[usize::from(lab_kernel.form == Form::Polynomial)],
                     &constants,
                 ];
-                let shape = (run, has_keys);
                 let all = (buffers, &results);
                 let (row, of_lanes) =
                     self.kernel_row(lab_kernel, shape, today_lanes, all, &mut lists)?;
@@ -417,7 +472,7 @@ impl Bench<'_> {
                     share_of_filling,
                     ..row
                 });
-                if !has_keys {
+                if !shape.has_keys {
                     shares[class].extend(of_lanes);
                 }
             }
@@ -426,19 +481,24 @@ impl Bench<'_> {
         Ok(())
     }
 
-    /// Measures the variants of a kernel over runs of a length; also those of today's that differ in their lanes, as
-    /// shares of today's time, if none was rejected.
+    /// Measures the variants of a kernel over runs of a length; track by track also those of today's that differ in their
+    /// lanes, as shares of today's time, if none was rejected.
     fn kernel_row(
         &mut self,
         lab_kernel: LabKernel,
-        (run, has_keys): (u32, bool),
+        shape: RunShape,
         today_lanes: u32,
         (read, results): ([&Buffer; 2], &Buffer),
         lists: &mut Vec<ListedRuns>,
     ) -> Result<(LabRow, Option<[Timed; 4]>), VulkanError> {
         let kernel = lab_kernel.kernel();
         let detail = lab_kernel.encoding.row().detail;
-        let mut variants = self.variants(lab_kernel, today_lanes);
+        let RunShape {
+            layout,
+            samples: run,
+            has_keys,
+        } = shape;
+        let mut variants = self.variants(lab_kernel, layout, today_lanes);
         variants.retain(|variant| {
             let mut rejected = self.report.rejected.iter();
             let is_rejected = |one: &RejectedVariant| {
@@ -454,7 +514,7 @@ impl Bench<'_> {
         };
         let mut prepared = Vec::new();
         for &variant in &variants {
-            let lanes = variant.spread_lanes();
+            let lanes = variant.spread_lanes(self.tracks());
             let is_listed = |list: &ListedRuns| (list.lanes, list.list) == (lanes, variant.list);
             if !lists.iter().any(is_listed) {
                 lists.push(self.listed(like, run, lanes, variant.list)?);
@@ -494,7 +554,8 @@ impl Bench<'_> {
         let candidates = candidates.map(|one| (one.time, one.variant.new_pipelines(today.variant)));
         let winner = finalists[rules::winner(&Vec::from_iter(candidates))];
         let mut of_lanes = Vec::new();
-        for lanes in LANES {
+        let by_frames = layout == Layout::FrameMajor;
+        for lanes in LANES.into_iter().filter(|_| !by_frames) {
             let variant = KernelVariant {
                 lanes,
                 ..today.variant
@@ -509,6 +570,7 @@ impl Bench<'_> {
             kernel: prepared[0].0.name,
             run,
             has_keys,
+            by_frames,
             bytes: u64::from(self.effort.samples) * lab_kernel.encoding.bytes() as u64,
             today,
             winner,
@@ -537,7 +599,7 @@ impl Bench<'_> {
             form: Form::Arc,
             encoding: Encoding::F32,
         };
-        let today = self.variants(kernel, 8)[0];
+        let today = self.variants(kernel, Layout::TrackMajor, 8)[0];
         let pipeline = self.pipeline(kernel.kernel(), today)?;
         let constant = SpreadRun {
             count: IS_CONSTANT,

@@ -84,6 +84,8 @@ pub struct LabRow {
     pub run: u32,
     /// Whether each run begins with a key.
     pub has_keys: bool,
+    /// Whether the result is frame by frame, not track by track.
+    pub by_frames: bool,
     /// The bytes that one dispatch writes.
     pub bytes: u64,
     /// The engine's variant.

@@ -3,6 +3,7 @@
 
 use crate::machine::error::VulkanError;
 use crate::output::encoding::Encoding;
+use crate::output::rotations::Layout;
 use crate::shader::{Form, Kernel, List, SPREAD_WORKGROUP, Store, Variants, spirv};
 use crate::work::lists::spread::SpreadLanes;
 
@@ -34,6 +35,9 @@ pub enum RunList {
     EachTrack,
     /// The runs of a few tracks, which are repeated for others with the same times.
     Shared,
+    /// The runs of one track, frame by frame: each lane evaluates those of its track, and neighbours have neighbouring
+    /// tracks.
+    Tracks,
 }
 
 /// One way to run a kernel.
@@ -77,8 +81,14 @@ impl KernelVariant {
         usize::from(self.code() != today.code())
     }
 
-    pub(super) fn spread_lanes(self) -> SpreadLanes {
-        SpreadLanes::new(self.lanes.ilog2()).with_workgroup(self.workgroup)
+    /// The lanes of its lists. Frame by frame, the samples of a track are so far from each other.
+    pub(super) fn spread_lanes(self, stride: u32) -> SpreadLanes {
+        let log2 = self.lanes.ilog2();
+        let lanes = match self.list {
+            RunList::EachTrack | RunList::Shared => SpreadLanes::new(log2),
+            RunList::Tracks => SpreadLanes::with_tracks(log2, stride),
+        };
+        lanes.with_workgroup(self.workgroup)
     }
 
     /// The kernel's name and its code in this variant.
@@ -129,9 +139,10 @@ impl LabKernel {
         Kernel::over_segments(self.form, List::FramesSpread, self.encoding.row().store)
     }
 
-    /// The variant that the engine runs today, then the others.
+    /// The variant that the engine runs today for results in an order, then the others.
     pub(super) fn variants(
         self,
+        layout: Layout,
         today_lanes: u32,
         converts: bool,
         largest: u32,
@@ -142,12 +153,16 @@ impl LabKernel {
             (true, true) => &[Some(HalfConversion::Device), Some(HalfConversion::Integers)],
             (true, false) => &[Some(HalfConversion::Integers)],
         };
+        let (list, all_lanes): (_, &[u32]) = match layout {
+            Layout::TrackMajor => (RunList::EachTrack, &[4, 8, 16, 32]),
+            Layout::FrameMajor => (RunList::Tracks, &[8, 32, 128]),
+        };
         let today = KernelVariant {
             lanes: today_lanes,
             workgroup: SPREAD_WORKGROUP,
             stores: StoreCaching::Streamed,
             halves: conversions[0],
-            list: RunList::EachTrack,
+            list,
         };
         let mut all = vec![today];
         for &halves in conversions {
@@ -156,24 +171,26 @@ impl LabKernel {
                     .into_iter()
                     .filter(|&n| n <= largest)
                 {
-                    for lanes in [4, 8, 16, 32] {
+                    for &lanes in all_lanes.iter().filter(|&&lanes| lanes <= workgroup) {
                         let variant = KernelVariant {
                             lanes,
                             workgroup,
                             stores,
                             halves,
-                            list: RunList::EachTrack,
+                            list,
                         };
                         all.extend((variant != today).then_some(variant));
                     }
                 }
             }
         }
-        all.extend([4, 8, 16, 32].map(|lanes| KernelVariant {
-            lanes,
-            list: RunList::Shared,
-            ..today
-        }));
+        if layout == Layout::TrackMajor {
+            all.extend(all_lanes.iter().map(|&lanes| KernelVariant {
+                lanes,
+                list: RunList::Shared,
+                ..today
+            }));
+        }
         all
     }
 }
@@ -194,14 +211,19 @@ mod tests {
         for (kernel, converts, count) in
             [(&kernels[0], true, 28), (f16, false, 28), (f16, true, 52)]
         {
-            let all = kernel.variants(8, converts, 1024);
+            let all = kernel.variants(Layout::TrackMajor, 8, converts, 1024);
             assert_eq!(all.len(), count);
             assert!((1..count).all(|i| !all[..i].contains(&all[i])));
             assert_eq!((all[0].lanes, all[0].workgroup), (8, 128));
             assert_eq!(
-                kernel.variants(8, converts, 128).len(),
+                kernel.variants(Layout::TrackMajor, 8, converts, 128).len(),
                 (count - 4) / 3 * 2 + 4
             );
+            // Frame by frame, lanes of a run are not divided among workgroups.
+            let by_frames = kernel.variants(Layout::FrameMajor, 128, converts, 1024);
+            assert_eq!(by_frames.len(), (count - 4) / 12 * 8);
+            assert!((1..by_frames.len()).all(|i| !by_frames[..i].contains(&by_frames[i])));
+            assert!(by_frames.iter().all(|one| one.lanes <= one.workgroup));
         }
     }
 
@@ -211,7 +233,7 @@ mod tests {
         for lab_kernel in LabKernel::all() {
             let kernel = lab_kernel.kernel();
             let (_, shipped, _) = kernel.code(Variants::default());
-            let all = lab_kernel.variants(8, false, 1024);
+            let all = lab_kernel.variants(Layout::TrackMajor, 8, false, 1024);
             assert_eq!(all[0].code_of(kernel).unwrap().1, shipped);
             let bound_of = |code: &[u32]| code[3] - shipped[3];
             for variant in all {

@@ -128,6 +128,15 @@ impl SpreadLanes {
         }
     }
 
+    /// Lanes with neighbouring tracks, whose samples are so far from each other.
+    #[cfg(feature = "prove")]
+    pub(crate) fn with_tracks(log2: u32, stride: u32) -> Self {
+        Self {
+            axis: LaneAxis::Tracks { stride },
+            ..Self::new(log2)
+        }
+    }
+
     /// The same for a kernel whose workgroups have another number of invocations.
     #[cfg(feature = "prove")]
     pub(crate) fn with_workgroup(self, workgroup: u32) -> Self {
@@ -163,7 +172,7 @@ impl SpreadLanes {
         self.axis
     }
 
-    fn lanes(self) -> u32 {
+    pub(crate) fn lanes(self) -> u32 {
         1 << self.log2
     }
 

@@ -88,6 +88,7 @@ fn times(time: Timed) -> String {
 
 fn kernel(row: &LabRow) -> String {
     let keys = if row.has_keys { " with keys" } else { "" };
+    let order = if row.by_frames { " by frames" } else { "" };
     let winner = match row.winner.variant == row.today.variant {
         true => "today's".to_owned(),
         false => format!(
@@ -97,7 +98,7 @@ fn kernel(row: &LabRow) -> String {
         ),
     };
     format!(
-        "  {:38} {:3}{keys}  {:8.2} µs  {winner}, {:.2}",
+        "  {:38} {:3}{keys}{order}  {:8.2} µs  {winner}, {:.2}",
         row.kernel,
         row.run,
         row.today.time.best(),
@@ -124,6 +125,7 @@ fn described(variant: KernelVariant) -> String {
     let list = match list {
         RunList::EachTrack => "",
         RunList::Shared => ", one list for all tracks",
+        RunList::Tracks => ", of neighbouring tracks",
     };
     format!("{lanes} lanes, workgroups of {workgroup}{stores}{halves}{list}")
 }
@@ -157,6 +159,7 @@ mod tests {
             kernel: "arc_frames_spread_f32",
             run,
             has_keys: false,
+            by_frames: true,
             bytes: 79_000_000,
             today: VariantTime {
                 variant: today,
@@ -205,6 +208,7 @@ mod tests {
             "{text}"
         );
         assert!(text.ends_with("12 s; the time was over before all was measured (--time-limit)\n"));
+        assert!(text.contains(" 48 by frames  "), "{text}");
         (report.rows, report.ceilings, report.rejected) = Default::default();
         assert_eq!(page("a card", 1.0, &report).lines().count(), 2);
     }
