@@ -166,7 +166,7 @@ fn last(name: &Path) -> io::Result<&OsStr> {
     name.file_name().ok_or_else(leads_out)
 }
 
-/// By the descriptor of the directory.
+/// Access to files relative to the descriptor of an open directory.
 #[cfg(unix)]
 mod system {
     use std::os::unix::fs::MetadataExt;

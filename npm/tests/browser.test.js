@@ -33,7 +33,7 @@ try {
 
 const TYPES = { js: "text/javascript", wasm: "application/wasm" };
 
-/** What a page posts to `/result`, of a browser of its own. */
+/** Starts a browser with a new profile, and returns the JSON that the page posts to `/result`. */
 async function shown(browser) {
   let finish;
   const result = new Promise((resolve) => (finish = resolve));

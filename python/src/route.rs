@@ -372,6 +372,9 @@ impl Surface {
     ) -> Route {
         for (end, off) in ["start", "goal"].into_iter().zip(found.off) {
             if off > 1e-6 * self.size() {
+                // Four digits: the distance only shows how wrong the point is.
+                let digits = format!("{off:.3e}");
+                let off = digits.parse().unwrap_or(off);
                 messages.push(format!(
                     "{name}{end}: it is {off} away from the surface; the nearest point of the surface is used"
                 ));

@@ -428,7 +428,7 @@ def test_what_cannot_be_followed(rng, engine):
         engine.follow(times[:2], np.zeros((2, 3)), fps=10)
 
 
-# Ways
+# Routes
 
 
 def hill(n=24):

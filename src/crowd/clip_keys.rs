@@ -208,7 +208,7 @@ pub(crate) struct KeyRows<'a> {
 }
 
 impl<'a> KeyRows<'a> {
-    /// Those from `channel` on, in a time base with so many spans.
+    /// The rows of the channels from `channel` on, in a time base with `rows` spans.
     #[inline(always)]
     pub(crate) fn new(cells: &'a [[f32; 4]], channel: &CrowdChannel, rows: usize) -> Self {
         Self {

@@ -106,8 +106,8 @@ fn square(vector: Vec4) -> f32 {
     dot(vector.to_array(), vector.to_array())
 }
 
-/// Of how many out of at most 64 places the steps between neighbouring keys are small, and the number of places. Only
-/// speed depends on this; the bits do not.
+/// Probes the keys at up to 64 places. Returns the number of places at which the steps between neighbouring keys are
+/// small, and the number of places. Only speed depends on this; the bits do not.
 fn probed<const STEPS: usize>(
     set: &TrackSet,
     is_small: impl Fn([Vec4; STEPS]) -> bool,

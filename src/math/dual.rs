@@ -153,7 +153,7 @@ operators! {
 /// How many coefficients a power series has.
 const TERMS: usize = 12;
 
-/// Those of `sin(x)/x` by `x²`.
+/// The coefficients of `sin(x)/x` in powers of `x²`.
 const SINC: [f64; TERMS] = {
     let mut coefficients = [1.0; TERMS];
     let mut k = 1;
@@ -165,7 +165,7 @@ const SINC: [f64; TERMS] = {
     coefficients
 };
 
-/// Those of `4 asin²(√u)` by `u`: asin²(x) = ½ Σ (2x)²ⁿ / (n² binomial(2n, n)).
+/// The coefficients of `4 asin²(√u)` in powers of `u`: asin²(x) = ½ Σ (2x)²ⁿ / (n² binomial(2n, n)).
 const ARC_SQUARES: [f64; TERMS] = {
     let mut coefficients = [0.0; TERMS];
     let (mut term, mut k) = (2.0, 1);

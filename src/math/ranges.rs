@@ -74,7 +74,7 @@ pub(crate) struct Waves<const N: usize> {
     pub(crate) limit: f64,
     /// The coefficients of `(sin(x)/x - 1) / x²` in powers of x²; from Chebyshev nodes.
     sinc: [f64; N],
-    /// Those of `(cos(x) - 1) / x²`.
+    /// The coefficients of `(cos(x) - 1) / x²` in powers of x².
     cosine: [f64; N],
 }
 

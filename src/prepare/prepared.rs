@@ -463,7 +463,7 @@ impl Segments {
         self.len() * segment_size(self.form)
     }
 
-    /// Those that are computed.
+    /// The bytes of the segments that are computed.
     #[cfg_attr(not(feature = "vulkan"), allow(dead_code))]
     pub(crate) fn as_bytes(&self) -> &[u8] {
         match self.form {

@@ -65,9 +65,9 @@ pub(crate) struct KernelCode {
 /// The variants of kernels that a device takes where they are.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Variants {
-    /// Those that read texel buffers.
+    /// Whether to use the variants that read texel buffers.
     pub(crate) reads_texels: bool,
-    /// Those that convert to half precision.
+    /// Whether to use the variants that convert to half precision by the device's instruction.
     pub(crate) converts: bool,
 }
 

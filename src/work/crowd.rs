@@ -57,7 +57,7 @@ pub(crate) enum WholeKernel {
 }
 
 impl WholeKernel {
-    /// That of a device, if it has one: by subgroups where it can.
+    /// The kernel that a device uses, if it has one for whole instances: the one by subgroups if the device supports it.
     fn new(
         arguments: &CrowdDispatch,
         output: CrowdOutput,

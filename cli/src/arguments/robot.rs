@@ -382,7 +382,7 @@ impl DialectArguments {
     }
 }
 
-/// As an error of the engine, so that another device may take over, or else as a result.
+/// Returns an error of the engine as such, so that another device may take over; other errors stay in the result.
 pub(crate) fn or_engine_error(
     found: Result<Bodies, BodiesError>,
 ) -> Result<Result<Bodies, BodiesError>, Error> {

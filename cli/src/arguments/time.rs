@@ -61,9 +61,9 @@ pub(crate) struct SamplingArguments {
 /// `--fps`: how many frames a second has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum RateChoice {
-    /// As many as the keys of each input.
+    /// The rate of each input's keys.
     Source,
-    /// Twice as many: the frames of the keys, and those halfway between them, where curves differ.
+    /// Twice the rate of each input's keys: their frames, and those halfway between them, where curves differ.
     SourceAndHalves,
     Number(FrameRate),
 }

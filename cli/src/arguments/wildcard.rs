@@ -131,7 +131,7 @@ impl PatternPart {
 /// A pattern of names in a path: of one name, or of several that follow each other.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct PathPattern {
-    /// As it was given.
+    /// The pattern as on the command line.
     text: String,
     names: Vec<PathPart>,
 }

@@ -270,9 +270,9 @@ impl ManifestLine {
 
 /// The inputs without all their results.
 pub(crate) struct UnfinishedInputs<'a> {
-    /// Those that failed, at least in part.
+    /// The inputs that failed, at least in part.
     pub(crate) failed: Vec<&'a InputEntry>,
-    /// The paths of those that no batch has come to, or that a batch was stopped in.
+    /// The paths of inputs that no batch has processed yet, or in which a batch was stopped.
     pub(crate) pending: BTreeSet<&'a str>,
 }
 

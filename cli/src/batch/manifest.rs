@@ -62,11 +62,11 @@ pub(crate) struct Manifest {
 #[derive(Default)]
 pub(crate) struct PlannedResults {
     names: BTreeSet<String>,
-    /// By the inputs' paths.
+    /// The names of results, by the paths of their inputs.
     of_inputs: BTreeMap<String, String>,
-    /// Those whose files have all been made.
+    /// The names whose files have all been written.
     ended: BTreeSet<String>,
-    /// Those that were complete already.
+    /// The names whose results were complete before.
     complete: BTreeSet<String>,
 }
 

@@ -177,7 +177,7 @@ pub(crate) struct Pipeline<'a> {
 enum InputSource {
     /// One, or none.
     One(Box<dyn InputReader>, std::vec::IntoIter<PipelineJob>),
-    /// As many as are left for a thread.
+    /// Inputs that a thread reads in advance.
     Ahead {
         read_jobs: Receiver<ReadJob>,
         left: usize,

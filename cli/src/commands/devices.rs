@@ -50,11 +50,11 @@ struct DeviceEntry {
 /// The kernels of a device: how many there are, and the results of their checks.
 #[derive(Default, Serialize)]
 struct KernelSummary {
-    /// Those that may run on the device.
+    /// The number of kernels that may run on the device.
     all: usize,
-    /// Those that have the CPU's bits on it: checked now, or known from before.
+    /// The number of kernels that gave the CPU's bits on the device, now or in an earlier check.
     exact: usize,
-    /// Those that differ.
+    /// The kernels whose bits differ.
     differing: Vec<KernelCheck>,
 }
 

@@ -26,7 +26,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         }
         Some(name) => {
             let code = Code::named(name).ok_or_else(|| {
+                // Codes have four characters: from a shorter text, none can be told apart as near.
                 let known = Code::ALL.iter().map(|code| code.name());
+                let known = known.filter(|known| known.len() == name.len());
                 let hint = words::nearest(name, known)
                     .map(|near| format!("; did you mean {near}?"))
                     .unwrap_or_default();

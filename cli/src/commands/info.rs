@@ -132,7 +132,7 @@ struct ScalarSummary {
     keys: usize,
     /// The smallest and the largest key.
     range: [f64; 2],
-    /// Those that the joint allows.
+    /// The smallest and the largest value that the joint allows.
     #[serde(skip_serializing_if = "Option::is_none")]
     limits: Option<[f64; 2]>,
 }

@@ -188,9 +188,9 @@ struct ClipReport {
     resting: Vec<String>,
     /// Joints of the input that nothing follows.
     dropped: Vec<String>,
-    /// Of these, the joint that rotates furthest from where it rests, and how far, in degrees.
+    /// The dropped joint that rotates furthest from its rest pose, and this angle, degrees.
     furthest_dropped: Option<(String, f64)>,
-    /// By how many degrees the rest pose of each joint was aligned.
+    /// The angle by which the rest pose of each joint was aligned, degrees.
     aligned: serde_json::Map<String, serde_json::Value>,
     scale: f64,
     /// x y z w.

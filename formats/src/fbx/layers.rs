@@ -28,10 +28,10 @@ pub(super) struct StackLayers {
     /// The animations of some of these layers, for nodes that the others do not move: each layer of an animation costs
     /// time at every evaluation.
     partial: Vec<LayerAnim>,
-    /// By the index of the node: the index of its animation in `partial`.
+    /// The index in `partial` of a node's animation, by the index of the node.
     partial_of: HashMap<usize, usize>,
-    /// By the index of the node: the layers with curves of its translation. Only nodes that a layer overrides with a
-    /// weight below 1.
+    /// The layers with curves of a node's translation, by the index of the node. Contains only nodes that a layer
+    /// overrides with a weight below 1.
     weighted: HashMap<usize, Vec<WeightedLayer>>,
 }
 

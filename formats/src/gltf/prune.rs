@@ -246,7 +246,7 @@ impl<'a> Reference<'a> {
 }
 
 impl<'a> References<'a> {
-    /// Those of a file, except those of samplers that are left out.
+    /// The references in a file, without those of samplers that are left out.
     fn of(json: &Json<'a>, left_samplers: &[LeftOut]) -> Result<Self, Diagnostic> {
         let mut found = Self::default();
         let none = LeftOut::default();

@@ -14,12 +14,12 @@ pub struct ContactLimits {
 }
 
 impl ContactLimits {
-    /// Those of ProtoMotions' converters.
+    /// The limits of ProtoMotions' converters.
     pub const PROTOMOTIONS: Self = Self {
         height: 0.1,
         speed: 0.15,
     };
-    /// Those of Kimodo's metrics.
+    /// The limits of Kimodo's metrics.
     pub const KIMODO: Self = Self {
         height: 0.05,
         speed: 0.2,

@@ -89,9 +89,9 @@ pub struct Outside {
 /// Samples without those that are left out.
 #[derive(Debug, Clone)]
 pub struct KeptSamples {
-    /// Those that are kept, in seconds; frames of a rate stay such.
+    /// The times that are kept [s]; frames of a rate stay frames of this rate.
     pub samples: SampleTimes,
-    /// How many there were.
+    /// The number of times before.
     pub all: usize,
     /// How many are left out.
     pub left_out: usize,

@@ -19,9 +19,9 @@ pub struct ClipSkeleton {
 /// Which offsets joints without translation keys have.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum OffsetSource {
-    /// Those of each clip.
+    /// Each clip uses its own offsets.
     Clip,
-    /// Those of the library's skeleton, which the caller chose for all clips. They also place the joints of clips
+    /// All clips use the offsets of the library's skeleton, which the caller chose. They also place the joints of clips
     /// without offsets.
     Skeleton,
 }

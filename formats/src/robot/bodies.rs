@@ -451,7 +451,7 @@ struct JointTracks {
     scalars: Vec<Option<usize>>,
     balls: Vec<Option<usize>>,
     free: Vec<Option<usize>>,
-    /// Of a robot without a free joint.
+    /// The track of the base, for a robot without a free joint.
     base: Option<usize>,
 }
 

@@ -44,7 +44,7 @@ if TYPE_CHECKING:
     _Name: TypeAlias = _JointName | _ScalarName
     from typing_extensions import TypeVar as _TypeVar
 
-    # The arrays of results: of NumPy, or of a library on a device.
+    # The type of the arrays in results: NumPy's, or that of a library whose arrays are on a device.
     _A = _TypeVar("_A", default=NDArray[np.float32])
 else:
     _A = TypeVar("_A")
@@ -61,7 +61,7 @@ _SCALARS: tuple[_ScalarName, ...] = ("dofs", "dof_velocities", "contacts")
 _ALL: tuple[_Name, ...] = (*_NAMES, *_SCALARS)
 # The shape of a rotation in each representation.
 _SHAPES: dict[str, tuple[int, ...]] = {"quaternion": (4,), "matrix": (3, 3), "6d": (6,), "rotvec": (3,)}
-# Where the arrays of a file start: a multiple of every processor's alignment, and of a cache line.
+# Arrays in a file start at a multiple of this [bytes]: the alignment of every processor, and a cache line.
 _ALIGNED = 64
 _VERSION = 2
 # Members of every file, in addition to those that the extension module requires.

@@ -129,7 +129,7 @@ struct Cursor {
     /// The number of the part, counted in each track, and of the span, counted in the part.
     part: usize,
     span: usize,
-    /// Of the keys at both ends of the span, for tracks that are sampled from keys.
+    /// The tangent weights of the keys at both ends of the span, for tracks that are sampled from keys.
     weights: [TangentWeights; 2],
 }
 
@@ -558,7 +558,7 @@ fn source_at(prepared: &Prepared, part: &SampledPart, cursor: &Cursor, time: f64
 /// Tracks of one group with one part each, at a time in the span of their cursor.
 struct TracksAtCursor<'a> {
     group: &'a SampledGroup,
-    /// Of each track.
+    /// The part of each track.
     parts: &'a [SampledPart],
     cursor: &'a Cursor,
     time: f64,

@@ -132,7 +132,7 @@ pub(crate) struct Passes {
 }
 
 impl Passes {
-    /// Those that a cache keeps. All engines of a process that use the same cache share them, also without files.
+    /// The passed checks that a cache keeps. All engines of a process that use the same cache share them, also without files.
     pub(crate) fn kept_in(cache: &Cache) -> Arc<Self> {
         static ALL: Mutex<BTreeMap<Cache, Arc<Passes>>> = Mutex::new(BTreeMap::new());
         let mut all = lock(&ALL);

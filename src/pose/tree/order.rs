@@ -25,9 +25,9 @@ pub enum Siblings {
     /// As in the file.
     #[default]
     File,
-    /// By their names.
+    /// Sorted by the names of the bodies.
     BodyName,
-    /// By the names of their first joints, as pinocchio does; bodies without joints by their own names.
+    /// Sorted by the names of the bodies' first joints, as in pinocchio; bodies without joints by their own names.
     JointName,
 }
 

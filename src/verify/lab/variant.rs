@@ -21,9 +21,9 @@ pub enum StoreCaching {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum HalfConversion {
-    /// By operations on integers.
+    /// The conversion is computed by operations on integers.
     Integers,
-    /// By the device's instruction.
+    /// The conversion is the device's instruction.
     Device,
 }
 

@@ -51,7 +51,7 @@ impl RunCounts {
         Self::of_chunks(lists.iter().flat_map(|list| &list.chunks), 1)
     }
 
-    /// Those of chunks that are repeated.
+    /// As [`Self::of_lists`], for chunks that are repeated `repetitions` times.
     pub(crate) fn of_chunks<'a>(
         chunks: impl Iterator<Item = &'a WorkChunk> + Clone,
         repetitions: u64,

@@ -29,7 +29,7 @@ pub(crate) struct Section {
     workload: WorkloadKind,
     method: String,
     rotations: usize,
-    /// Of the files, where files are read.
+    /// The size of the files, if files are read.
     #[serde(skip_serializing_if = "Option::is_none")]
     file_bytes: Option<u64>,
     /// The most memory that the process has had so far, where that was asked.
@@ -235,7 +235,7 @@ fn peak_memory() -> Option<u64> {
 }
 
 impl BenchRow {
-    /// Of the bytes that a device writes, and those that it can write in a second.
+    /// Sets the share of the device's bandwidth. `on_device`: the bytes written, and the bytes per second it can write.
     pub(crate) fn share_of_device(&mut self, on_device: Option<(u64, f64)>) {
         let known = on_device.filter(|&(_, limit)| limit > 0.0 && self.milliseconds > 0.0);
         self.share_of_device_write_rate =

@@ -146,7 +146,7 @@ fn ball() -> TriangleMesh {
     (positions, faces)
 }
 
-/// As OBJ, whose vertices count from 1.
+/// Writes a mesh as OBJ, in which indices of vertices begin at 1.
 fn write((positions, triangles): &TriangleMesh, out: &mut impl Write) -> io::Result<()> {
     for position in positions {
         writeln!(

@@ -151,12 +151,9 @@ pub(super) fn moving_boxes(set: &TrackSet, name: &str) -> Vec<usize> {
     if !still.is_empty() {
         let names = still.iter().map(|&index| box_name(set, index));
         let names: Vec<String> = names.collect();
-        let (subject, object) = match still.len() {
-            1 => ("it does", "it"),
-            _ => ("they do", "them"),
-        };
+        let object = if still.len() == 1 { "it" } else { "them" };
         words::note(&format!(
-            "{name}: not drawn, {subject} not turn: {}; --tracks draws {object}",
+            "{name}: without rotation and not drawn: {}; --tracks draws {object}",
             names.join(", ")
         ));
     }
@@ -186,12 +183,9 @@ pub(super) fn changing_scalars(clip: &Motion, name: &str) -> Vec<usize> {
             .iter()
             .map(|&index| scalar_name(clip, index))
             .collect();
-        let (subject, object) = match still.len() {
-            1 => ("it does", "it"),
-            _ => ("they do", "them"),
-        };
+        let object = if still.len() == 1 { "it" } else { "them" };
         words::note(&format!(
-            "{name}: not drawn, {subject} not change: {}; --scalars draws {object}",
+            "{name}: without change and not drawn: {}; --scalars draws {object}",
             names.join(", ")
         ));
     }

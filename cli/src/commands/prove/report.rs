@@ -120,9 +120,9 @@ pub(crate) struct KernelSection {
     pub(crate) ran: usize,
     /// Values compared.
     pub(crate) values: u64,
-    /// Those whose bits differ.
+    /// The values whose bits differ.
     pub(crate) differing: Vec<DifferingValues>,
-    /// Those whose bits differ, and in whose place the engine uses others.
+    /// Values whose bits differ, and for which the engine uses other kernels.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub(crate) replaced: Vec<DifferingValues>,
     /// The names of those that did not run.
@@ -159,7 +159,7 @@ pub(crate) struct GoldenSection {
     pub(crate) cases_compared: usize,
     /// How many configurations of the device there are.
     pub(crate) settings: usize,
-    /// Those in which some were evaluated.
+    /// The configurations in which results were evaluated.
     pub(crate) by_setting: Vec<GoldenSetting>,
     pub(crate) bytes: u64,
     pub(crate) differing: Vec<String>,

@@ -104,7 +104,7 @@ impl StoredSkin {
 struct StoredClip {
     /// As `tumble_formats::packed` has it.
     bytes: String,
-    /// By which methods.
+    /// The methods that the page can evaluate.
     methods: Vec<&'static str>,
 }
 

@@ -10,7 +10,7 @@ from typing import Any
 import tumble
 from tumble import _tumble
 
-# The outcome of a shard, or the refusal of an input, as JSON has it.
+# The JSON object of a shard's outcome, or of an input that failed.
 Entry = dict[str, Any]
 
 USAGE, SOME_INPUTS, ALL_INPUTS, DEVICE, OUTPUT, DIFFERENCE = 2, 3, 4, 6, 7, 8
