@@ -9,8 +9,8 @@ use crate::support::{KERNEL_OPTIONS, hostile_set, is_due, vulkan_engines};
 use glam::Quat;
 use tumble::vulkan::tuning::{Mapping, Reads};
 use tumble::{
-    Axes, Clip, Device, Encoding, Engine, Error, Interpolation, Layout, MatrixOrder, Quantity, SampleTimes,
-    TrackSet, method,
+    Axes, Clip, Device, Encoding, Engine, Error, Interpolation, Layout, MatrixOrder, Quantity,
+    SampleTimes, TrackSet, method,
 };
 
 /// On the threads of an engine, too.
@@ -34,7 +34,10 @@ fn matrices_are_those_of_the_encoding_whole_or_their_first_two_columns() {
             assert!(six.iter().eq(first));
         }
         let refused = engine.matrices_into(&rotations[..2], order, &mut [0.0; 16]);
-        assert!(matches!(refused, Err(Error::OutputLength { needed: 2, .. })));
+        assert!(matches!(
+            refused,
+            Err(Error::OutputLength { needed: 2, .. })
+        ));
     }
 }
 

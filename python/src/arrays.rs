@@ -217,7 +217,9 @@ pub(crate) fn whole_number<T: TryFrom<u64>>(
     meaning: &str,
 ) -> PyResult<T> {
     let refused = || {
-        let shown = value.repr().map_or_else(|_| String::new(), |text| format!("{text}: "));
+        let shown = value
+            .repr()
+            .map_or_else(|_| String::new(), |text| format!("{text}: "));
         format!("{label}: {shown}give {meaning}, as a whole number from 0 on")
     };
     if is_no_number(value)? {

@@ -64,7 +64,11 @@ impl ClipShape {
             let unknown = offsets.names().iter().find(|name| !names.contains(name));
             return unknown.map_or(Ok(true), |name| {
                 let known: Vec<&str> = names.iter().map(String::as_str).collect();
-                Err(unknown_name(&format!("there is no joint `{name}`"), name, &known))
+                Err(unknown_name(
+                    &format!("there is no joint `{name}`"),
+                    name,
+                    &known,
+                ))
             });
         }
         let (count, all) = (offsets.joint_count(), clip.set.track_count());

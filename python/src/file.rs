@@ -604,7 +604,9 @@ impl FileOptions {
             }
         }
         if let (Some(offsets), true) = (&self.offsets, are_of_selected) {
-            place(&mut loaded, &name, |clip| offsets.some_of(clip).of_clip(clip))?;
+            place(&mut loaded, &name, |clip| {
+                offsets.some_of(clip).of_clip(clip)
+            })?;
         }
         if self.scale.is_some() || self.up.is_some() {
             let factor = match (self.scale, loaded.space) {

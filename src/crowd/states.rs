@@ -223,7 +223,8 @@ impl MotionTables {
         self.check_parts((spans, cells))?;
         let all_spans: &[CrowdSpan] = bytemuck::cast_slice(spans);
         let each = self.joints * CHANNELS as usize;
-        let bases_of = |clip: &CrowdClip| &self.bases[clip.first_base as usize..][..clip.bases as usize];
+        let bases_of =
+            |clip: &CrowdClip| &self.bases[clip.first_base as usize..][..clip.bases as usize];
         let used = |channel: &CrowdChannel, bases: &[CrowdBase]| {
             let base = &bases[(channel.form_and_base & 0x00ff_ffff) as usize];
             ChannelCells::of(channel, base, all_spans)
@@ -237,12 +238,17 @@ impl MotionTables {
                 count: self.clips.len(),
             })?;
             let (bases, channels) = (bases_of(clip), &self.channels[index * each..][..each]);
-            let of_base = |base: &CrowdBase| base.first as usize..(base.first + base.count) as usize;
+            let of_base =
+                |base: &CrowdBase| base.first as usize..(base.first + base.count) as usize;
             let of_channels = channels.iter().flat_map(|channel| {
                 let cells = used(channel, bases);
                 [Some(cells.constants), cells.keys].into_iter().flatten()
             });
-            ranges.push((index, around(bases.iter().map(of_base)), around(of_channels)));
+            ranges.push((
+                index,
+                around(bases.iter().map(of_base)),
+                around(of_channels),
+            ));
         }
         let needed = |of: fn(&(usize, Range<usize>, Range<usize>)) -> usize| -> usize {
             ranges.iter().map(of).sum()
@@ -273,25 +279,23 @@ impl MotionTables {
             let moved = |first: u32, packed: usize| {
                 (first as usize + packed * first_cell - packed * cell_range.start) as u32
             };
-            found.channels.extend(
-                self.channels[index * each..][..each]
-                    .iter()
-                    .map(|channel| {
-                        let packed = match channel.form_and_base >> 24 {
-                            FORM_PACKED => 2,
-                            _ => 1,
-                        };
-                        let first = moved(channel.first, packed);
-                        CrowdChannel {
-                            first,
-                            keys: match used(channel, bases).keys {
-                                Some(_) => moved(channel.keys, 1),
-                                None => first,
-                            },
-                            ..*channel
-                        }
-                    }),
-            );
+            found
+                .channels
+                .extend(self.channels[index * each..][..each].iter().map(|channel| {
+                    let packed = match channel.form_and_base >> 24 {
+                        FORM_PACKED => 2,
+                        _ => 1,
+                    };
+                    let first = moved(channel.first, packed);
+                    CrowdChannel {
+                        first,
+                        keys: match used(channel, bases).keys {
+                            Some(_) => moved(channel.keys, 1),
+                            None => first,
+                        },
+                        ..*channel
+                    }
+                }));
             found.clips.push(CrowdClip {
                 first_base: found.bases.len() as u32,
                 ..*clip

@@ -307,7 +307,12 @@ fn some_clips_have_the_states_that_they_have_among_all() {
                 };
                 let one = states(&engine, &some, some_parts, &[(clip, tick)]);
                 let these = instance * joints..(instance + 1) * joints;
-                assert_eq!(one.rotations, all.rotations[these.clone()], "{}", method.name);
+                assert_eq!(
+                    one.rotations,
+                    all.rotations[these.clone()],
+                    "{}",
+                    method.name
+                );
                 assert_eq!(one.positions, all.positions[these.clone()]);
                 assert_eq!(one.angular_velocities, all.angular_velocities[these]);
             }

@@ -117,7 +117,9 @@ pub fn join(clips: &[&Motion], gap: Option<f64>) -> Result<Motion, JoinError> {
     for scalar in 0..first.set.scalar_count() {
         push_scalar(&mut joined, &parts, scalar)?;
     }
-    joined.rate = rate.or_else(|| joined.rate_of_keys());
+    if clips.iter().all(|clip| clip.rate.is_some()) {
+        joined.rate = rate.or_else(|| joined.rate_of_keys());
+    }
     Ok(joined)
 }
 
@@ -146,10 +148,15 @@ fn check(first: &Motion, clip: &Motion, index: usize) -> Result<(), JoinError> {
     let tracks = first.set.track_count();
     if let Some(track) = (0..tracks).find(|&track| first.origin(track) != clip.origin(track)) {
         let name = first.set.track_name(track);
-        return differ(&format!("the origin from which the positions of `{name}` count"));
+        return differ(&format!(
+            "the origin from which the positions of `{name}` count"
+        ));
     }
     let names = |motion: &Motion| -> Vec<String> {
-        motion.scalar_keys().map(|keys| keys.name.to_owned()).collect()
+        motion
+            .scalar_keys()
+            .map(|keys| keys.name.to_owned())
+            .collect()
     };
     if names(first) != names(clip) {
         return differ("the names or the order of their scalars");
@@ -161,7 +168,9 @@ fn check(first: &Motion, clip: &Motion, index: usize) -> Result<(), JoinError> {
     };
     if let Some(scalar) = scalars.find(is_other) {
         let name = &names(first)[scalar];
-        return differ(&format!("the kind, the origin or the interpolation of the scalar `{name}`"));
+        return differ(&format!(
+            "the kind, the origin or the interpolation of the scalar `{name}`"
+        ));
     }
     Ok(())
 }
@@ -241,7 +250,11 @@ impl<T: Copy> JoinedKeys<T> {
             sources: Vec::new(),
         };
         let constant = lists.iter().all(|(_, keys)| keys.len() == 1);
-        if constant && lists.windows(2).all(|pair| same(pair[0].1[0], pair[1].1[0])) {
+        if constant
+            && lists
+                .windows(2)
+                .all(|pair| same(pair[0].1[0], pair[1].1[0]))
+        {
             found.push(lists[0].0[0], lists[0].1[0], Some([(0, 0); 2]));
             return Ok(found);
         }
@@ -257,7 +270,8 @@ impl<T: Copy> JoinedKeys<T> {
                 if !same(found.keys[last], of_part.keys[0]) {
                     return Err(index - 1);
                 }
-                if let (Some(before), Some(after)) = (&mut found.sources[last], of_part.sources[0]) {
+                if let (Some(before), Some(after)) = (&mut found.sources[last], of_part.sources[0])
+                {
                     before[1] = after[1];
                 }
                 of_part.times.remove(0);
@@ -295,7 +309,10 @@ impl<T: Copy> JoinedKeys<T> {
             return found;
         }
         if joins[0] {
-            for time in [start, start + part.step].into_iter().filter(|&time| time < first) {
+            for time in [start, start + part.step]
+                .into_iter()
+                .filter(|&time| time < first)
+            {
                 if found.ends_before(part, time) {
                     found.push(part.moved(time), keys[0], None);
                 }
@@ -305,7 +322,10 @@ impl<T: Copy> JoinedKeys<T> {
             found.push(part.moved(time), key, Some([(0, index); 2]));
         }
         if joins[1] {
-            for time in [end - part.step, end].into_iter().filter(|&time| time > last) {
+            for time in [end - part.step, end]
+                .into_iter()
+                .filter(|&time| time > last)
+            {
                 if found.ends_before(part, time) {
                     found.push(part.moved(time), keys[keys.len() - 1], None);
                 }
@@ -316,7 +336,9 @@ impl<T: Copy> JoinedKeys<T> {
 
     /// Whether all keys are before a time of a part.
     fn ends_before(&self, part: &ClipPart<'_>, time: f64) -> bool {
-        self.times.last().is_none_or(|&last| last < part.moved(time))
+        self.times
+            .last()
+            .is_none_or(|&last| last < part.moved(time))
     }
 
     fn push(&mut self, time: f64, key: T, source: Option<[KeySource; 2]>) {
@@ -346,7 +368,10 @@ fn push_track(
     track: usize,
 ) -> Result<Channels, JoinError> {
     let name = parts[0].clip.set.track_name(track);
-    let tracks: Vec<_> = parts.iter().map(|part| part.clip.set.track(track)).collect();
+    let tracks: Vec<_> = parts
+        .iter()
+        .map(|part| part.clip.set.track(track))
+        .collect();
     let channel = || format!("the rotation of `{name}`");
     let no_data = || JoinError::KeyData { channel: channel() };
     let lists: Vec<(&[f64], &[Quat])> = tracks.iter().map(|it| (it.times, it.keys)).collect();
@@ -355,7 +380,11 @@ fn push_track(
         clip,
         channel: channel(),
     })?;
-    set.push(tracks[0].name.unwrap_or_default(), &joined.times, &joined.keys)?;
+    set.push(
+        tracks[0].name.unwrap_or_default(),
+        &joined.times,
+        &joined.keys,
+    )?;
     let index = set.track_count() - 1;
     let each: Vec<_> = tracks.iter().map(|it| it.tangents).collect();
     let tangents = joined.data(&each, |before, after| [before[0], after[1]]);
@@ -364,12 +393,16 @@ fn push_track(
         set.set_tangents(index, &tangents)?;
     }
     let each: Vec<_> = tracks.iter().map(|it| it.velocities).collect();
-    let velocities = joined.data(&each, |before, _| *before).ok_or_else(no_data)?;
+    let velocities = joined
+        .data(&each, |before, _| *before)
+        .ok_or_else(no_data)?;
     if !velocities.is_empty() {
         set.set_velocities(index, &velocities)?;
     }
     let each: Vec<_> = tracks.iter().map(|it| it.tcb).collect();
-    let tcb = joined.data(&each, |before, _| *before).ok_or_else(no_data)?;
+    let tcb = joined
+        .data(&each, |before, _| *before)
+        .ok_or_else(no_data)?;
     if !tcb.is_empty() {
         set.set_tcb(index, &tcb)?;
     }
@@ -395,9 +428,10 @@ fn push_track(
         let mut each: Vec<&[[Vec3; 2]]> = Vec::new();
         for (part, rest) in parts.iter().zip(&rests) {
             let keys = part.clip.set.vector_keys(of, track);
-            lists.push(keys.map_or((array::from_ref(&rest.0), array::from_ref(&rest.1)), |keys| {
-                (keys.times, keys.keys)
-            }));
+            lists.push(keys.map_or(
+                (array::from_ref(&rest.0), array::from_ref(&rest.1)),
+                |keys| (keys.times, keys.keys),
+            ));
             each.push(keys.map_or(&[], |keys| keys.tangents));
         }
         let joined = JoinedKeys::new(parts, &lists, |a, b| a == b);

@@ -45,11 +45,13 @@ pub fn retime(clip: &Motion, speed: f64, start: Option<f64>) -> Result<Motion, R
     let is_moved = speed != 1.0 || start != first;
     let time = |&time: &f64| start + (time - first) / speed;
     let mut lists: Vec<Vec<f64>> = match is_moved {
-        true => (clip.key_lists()).map(|list| list.iter().map(time).collect()).collect(),
+        true => (clip.key_lists())
+            .map(|list| list.iter().map(time).collect())
+            .collect(),
         false => clip.key_lists().map(<[f64]>::to_vec).collect(),
     };
     let rate = match is_moved {
-        true => restore(&mut lists, Precision::F64),
+        true => restore(&mut lists, Precision::F64).filter(|_| clip.rate.is_some()),
         false => clip.rate,
     };
     // In the order of `key_lists`.
@@ -78,7 +80,9 @@ pub fn retime(clip: &Motion, speed: f64, start: Option<f64>) -> Result<Motion, R
             let faster = |pair: &[Vec3; 2]| pair.map(|tangent| tangent * factor);
             let tangents: Vec<_> = keys.tangents.iter().map(faster).collect();
             match channel {
-                Channel::Translation => set.set_translations(index, &next(), keys.keys, &tangents)?,
+                Channel::Translation => {
+                    set.set_translations(index, &next(), keys.keys, &tangents)?
+                }
                 Channel::Scale => set.set_scales(index, &next(), keys.keys, &tangents)?,
             }
         }

@@ -207,6 +207,7 @@ class MotionLibrary(Generic[_A]):
     lengths: NDArray[np.float64]
     rates: NDArray[np.float64]
     skipped: list[Skipped]
+    _skipped_places: list[int]
 
     @overload
     def __init__(
@@ -901,11 +902,11 @@ class MotionLibrary(Generic[_A]):
         >>> ids
         array([0, 0, 0, 0])
         """
-        count, window = _count("count", count, "a number of clips"), _number("window", window, "seconds")
-        if window < 0:
+        count, seconds = _count("count", count, "a number of clips"), _number("window", window, "seconds")
+        if seconds < 0:
             raise InputError(f"window: {window!r} is no number of seconds from 0 on")
         _check_generator(rng)
-        left = self.lengths - window
+        left = self.lengths - seconds
         each = np.maximum(left, 0.0) if weights is None else _numbers("weights", weights, "numbers")
         if each.shape != (len(self),) or not np.isfinite(each).all() or (each < 0).any():
             raise InputError(f"weights: give a number of 0 or more for each of the {len(self)} clips")
@@ -1026,7 +1027,7 @@ class MotionLibrary(Generic[_A]):
         self._engine = engine if engine is not None else Engine()
         self._file = file
         self.skipped = []
-        self._skipped_places: list[int] = []
+        self._skipped_places = []
         self._only = np.asarray(arrays["only"]) if "only" in arrays else None
         self._put_on(device)
         return self

@@ -443,7 +443,9 @@ impl Clip {
         speed: Option<&Bound<'_, PyAny>>,
         start: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
-        let speed = speed.map(|it| number(it, "speed", "a factor")).transpose()?;
+        let speed = speed
+            .map(|it| number(it, "speed", "a factor"))
+            .transpose()?;
         let start = start.map(|it| number(it, "start", "seconds")).transpose()?;
         let motion = self.motion.clone();
         let retimed = work(py, motion.key_count(), move || {

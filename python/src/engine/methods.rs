@@ -51,7 +51,9 @@ impl Engine {
                 whole_number::<u64>(index, "device", meaning)?.to_string()
             }
         };
-        let memory = memory.map(|it| whole_number(it, "memory", "bytes")).transpose()?;
+        let memory = memory
+            .map(|it| whole_number(it, "memory", "bytes"))
+            .transpose()?;
         let threads = threads
             .map(|it| whole_number(it, "threads", "a number of threads"))
             .transpose()?;
