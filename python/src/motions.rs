@@ -1,5 +1,7 @@
 //! The tables behind `tumble.MotionLibrary`: clips of one skeleton, sampled at many times at once.
 
+pub(crate) mod scalars;
+
 use std::borrow::Cow;
 use std::fmt;
 use std::sync::Arc;
@@ -324,6 +326,29 @@ pub(crate) fn of_pushed(error: CrowdError, listed: ListedClip<'_>) -> PyErr {
     }
 }
 
+/// Tables, with their spans and cells.
+type BuiltTables = (MotionTables, Vec<[u32; 4]>, Vec<[f32; 4]>);
+
+/// The tables of clips, each of which is made by `clip`.
+fn built<'a>(
+    skeleton: &Skeleton,
+    (ticks_per_second, precision): (u32, KeyPrecision),
+    clips: &'a [Clip],
+    clip: impl Fn(ListedClip<'a>) -> PyResult<MotionClip<'a>>,
+) -> PyResult<BuiltTables> {
+    let made = MotionBuilder::new(skeleton, ticks_per_second, precision);
+    let mut builder = made.map_err(of_crowd)?;
+    let engine = tumble::Engine::new(Device::Cpu).map_err(|it| of_engine(&it))?;
+    let mut listed = ListedClip::all(clips).peekable();
+    while listed.peek().is_some() {
+        let batch: Vec<ListedClip<'_>> = listed.by_ref().take(CLIPS_AT_ONCE).collect();
+        let made: PyResult<Vec<MotionClip<'_>>> = batch.iter().map(|&it| clip(it)).collect();
+        let pushed = builder.push_all(&engine, &made?);
+        pushed.map_err(|(index, error)| of_pushed(error, batch[index]))?;
+    }
+    Ok(builder.finish())
+}
+
 #[pymethods]
 impl Motions {
     /// Prepares clips by a method. All have the joints of `skeleton`, a clip or the arrays `(parents, offsets)`; `None`:
@@ -384,31 +409,15 @@ impl Motions {
                     true => whole as u32 * TICKS,
                     false => (LONGEST / longest).max(1.0) as u32,
                 };
-                let made = MotionBuilder::new(&skeleton, ticks, precision);
-                let mut builder = made.map_err(of_crowd)?;
-                let engine = tumble::Engine::new(Device::Cpu).map_err(|it| of_engine(&it))?;
-                let mut listed = ListedClip::all(&clips).peekable();
-                while listed.peek().is_some() {
-                    let batch: Vec<ListedClip<'_>> = listed.by_ref().take(CLIPS_AT_ONCE).collect();
-                    let fitted: PyResult<Vec<MotionClip<'_>>> = batch
-                        .iter()
-                        .map(|&it| motion_clip(&shared, it, method))
-                        .collect();
-                    let pushed = builder.push_all(&engine, &fitted?);
-                    pushed.map_err(|(index, error)| of_pushed(error, batch[index]))?;
-                }
-                Ok(builder.finish())
+                built(&skeleton, (ticks, precision), &clips, |listed| {
+                    motion_clip(&shared, listed, method)
+                })
             })
         })?;
-        let (tables, spans, cells) = prepared;
-        let (spans, cells) = (spans_array(py, spans)?, cells_array(py, cells)?);
         Ok(Self {
-            tables,
-            spans: spans.unbind(),
-            cells: cells.unbind(),
             unplaced,
-            joint_names,
             skipped,
+            ..Self::of_parts(py, prepared, joint_names)?
         })
     }
 
@@ -483,6 +492,12 @@ impl Motions {
     /// Number of clips.
     fn __len__(&self) -> usize {
         self.tables.clip_count()
+    }
+
+    /// Number of ticks in a second.
+    #[getter]
+    fn ticks_per_second(&self) -> u32 {
+        self.tables.ticks_per_second()
     }
 
     /// Number of joints.
@@ -568,6 +583,22 @@ impl Motions {
 }
 
 impl Motions {
+    /// Those of tables, all of whose clips have positions.
+    fn of_parts(
+        py: Python<'_>,
+        (tables, spans, cells): BuiltTables,
+        joint_names: Vec<String>,
+    ) -> PyResult<Self> {
+        Ok(Self {
+            tables,
+            spans: spans_array(py, spans)?.unbind(),
+            cells: cells_array(py, cells)?.unbind(),
+            unplaced: Vec::new(),
+            joint_names,
+            skipped: Vec::new(),
+        })
+    }
+
     /// Does work with the tables, without the interpreter's lock.
     pub(crate) fn with_parts<T: Send>(
         &self,

@@ -30,6 +30,8 @@ def documented():
         yield f"tumble.{name}", value
         if inspect.isclass(value):
             for part, member in vars(value).items():
+                if isinstance(member, staticmethod):
+                    member = member.__func__
                 if not part.startswith("_") and getattr(member, "__doc__", None):
                     yield f"tumble.{name}.{part}", member
 

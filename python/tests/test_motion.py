@@ -722,6 +722,76 @@ def test_numbers_of_another_meaning_are_refused():
     assert library.sample_windows(0, 0.0, np.int64(3), Fraction(30)) == library.sample_windows([0][0], 0, 3, 30)
 
 
+def arm(frames, rate, names=("shoulder", "elbow", "wrist", "grip"), seed=0, start=0.0):
+    """A robot whose gripper has other key times than its joints."""
+    rng = np.random.default_rng(seed)
+    times = start + np.arange(frames) / rate
+    scalars = {name: (times, np.cumsum(0.1 * rng.normal(size=frames))) for name in names}
+    scalars[names[-1]] = (times[::3], rng.normal(size=len(times[::3])))
+    keys = np.stack([smooth(rng, frames)])
+    return tumble.Clip(times, keys, parents=[None], layout="track", offsets=[[0, 0, 0]], scalars=scalars)
+
+
+def test_scalars_are_columns_of_a_library(tmp_path, rng):
+    clips = [arm(31, 30), arm(91, 30, seed=1, start=2.0)]
+    for method in ("slerp", "bessel-overhauser"):
+        library = tumble.MotionLibrary(clips, method=method)
+        assert library.dof_names == ["shoulder", "elbow", "wrist", "grip"] and library.contact_names == []
+        ids = rng.integers(0, 2, (3, 5))
+        times = rng.uniform(-0.1, 1.1, (3, 5)) * library.lengths[ids]
+        state = library.sample(ids, times)
+        assert state.dofs.shape == (3, 5, 4) and state.contacts is None
+        for at in np.ndindex(3, 5):
+            clip = clips[ids[at]]
+            first, last = clip.span
+            time = np.clip(first + times[at], first, last)
+            expected = tumble.Engine("cpu").scalars(clip, at=[time], method=method)
+            np.testing.assert_allclose(state.dofs[at], expected[:, 0], atol=2e-6)
+        step = 1e-3
+        inside = library.sample_windows([0, 1], [0.404, 0.411], 3, 1 / step, arrays=["dofs", "dof_velocities"])
+        rate = (inside.dofs[:, 2] - inside.dofs[:, 0]) / (2 * step)
+        np.testing.assert_allclose(inside.dof_velocities[:, 1], rate, atol=0.01)
+        only = library.sample(ids, times, arrays=["dofs"])
+        assert only.rotations is None and np.array_equal(only.dofs, state.dofs)
+        memory = only.dofs
+        assert library.sample(ids, times + 0.1, out=only).dofs is memory
+        assert not np.array_equal(memory, state.dofs)
+        library.save(tmp_path / "arm.npz")
+        opened = tumble.MotionLibrary.open(tmp_path / "arm.npz")
+        assert opened.dof_names == library.dof_names and opened.sample(ids, times) == state
+        for part in (library.shard(1, 2), opened.shard(1, 2), pickle.loads(pickle.dumps(library.shard(1, 2)))):
+            assert part.sample(0, [0.5, 2.1]) == library.sample(1, [0.5, 2.1])
+    finite = tumble.MotionLibrary(clips).sample(0, 0.51, finite=True)
+    frames = tumble.MotionLibrary(clips).sample(0, np.array([15, 16]) / 30)
+    np.testing.assert_allclose(finite.dof_velocities, 30 * (frames.dofs[1] - frames.dofs[0]), atol=1e-4)
+
+
+def test_contacts_of_files_are_steps(tmp_path):
+    rows = ["time,qx,qy,qz,qw,knee.scalar_angle,foot.scalar_contact"]
+    rows += [f"{0.1 * frame},0,0,0,1,{0.2 * frame},{frame % 2}" for frame in range(6)]
+    (tmp_path / "walk.csv").write_text("\n".join(rows) + "\n")
+    library = tumble.MotionLibrary.load(tmp_path / "walk.csv", skeleton=([None], [[0, 0, 0]]))
+    assert (library.dof_names, library.contact_names) == (["knee"], ["foot"])
+    state = library.sample(0, [0.05, 0.1, 0.19, 0.2, 0.5])
+    assert state.contacts[:, 0].tolist() == [0, 1, 1, 0, 1]
+    np.testing.assert_allclose(state.dofs[:, 0], [0.1, 0.2, 0.38, 0.4, 1.0], atol=1e-6)
+
+
+def test_scalars_that_only_some_clips_have_are_no_columns():
+    other = arm(20, 30, names=("shoulder", "elbow", "ankle", "grip"))
+    library = tumble.MotionLibrary([arm(31, 30), other])
+    assert library.dof_names == [] and library.sample(0, 0.5).dofs is None
+    with pytest.raises(tumble.InputError, match=r"the library has no dofs: clips\[1\] has no scalar `wrist`"):
+        library.sample(0, 0.5, arrays=["dofs"])
+    with pytest.raises(tumble.InputError, match="the library has no contacts$"):
+        library.sample(0, 0.5, out=tumble.MotionState(contacts=np.zeros((1,), np.float32)))
+    # By name, in the order of the first clip.
+    shuffled = arm(20, 30, names=("elbow", "wrist", "shoulder", "grip"), seed=3)
+    both = tumble.MotionLibrary([arm(31, 30), shuffled]).sample(1, 0.5)
+    alone = tumble.MotionLibrary([shuffled]).sample(0, 0.5)
+    np.testing.assert_array_equal(both.dofs, alone.dofs[[2, 0, 1, 3]])
+
+
 def test_the_table_of_loaders_is_what_the_script_prints():
     done = subprocess.run(
         [sys.executable, str(ROOT / "python/examples/loaders.py")], capture_output=True, text=True, timeout=60

@@ -29,6 +29,7 @@ from tumble._tumble import (
     load,
     load_all,
     represent,
+    scalar_motions,
     shaped,
 )
 
@@ -36,22 +37,28 @@ if TYPE_CHECKING:
     _Path: TypeAlias = str | os.PathLike[str]
     _Skeleton: TypeAlias = Clip | _Path | tuple[Sequence[int | None], ArrayLike]
     _OnError: TypeAlias = Literal["refuse", "skip"]
-    _Name: TypeAlias = Literal[
+    _JointName: TypeAlias = Literal[
         "rotations", "positions", "world_rotations", "velocities", "angular_velocities"
     ]
+    _ScalarName: TypeAlias = Literal["dofs", "dof_velocities", "contacts"]
+    _Name: TypeAlias = _JointName | _ScalarName
     from typing_extensions import TypeVar as _TypeVar
 
     # The arrays of results: of NumPy, or of a library on a device.
     _A = _TypeVar("_A", default=NDArray[np.float32])
 else:
     _A = TypeVar("_A")
-_NAMES: tuple[_Name, ...] = (
+# The arrays of joints.
+_NAMES: tuple[_JointName, ...] = (
     "rotations",
     "positions",
     "world_rotations",
     "velocities",
     "angular_velocities",
 )
+# The arrays of scalars.
+_SCALARS: tuple[_ScalarName, ...] = ("dofs", "dof_velocities", "contacts")
+_ALL: tuple[_Name, ...] = (*_NAMES, *_SCALARS)
 # The shape of a rotation in each representation.
 _SHAPES: dict[str, tuple[int, ...]] = {"quaternion": (4,), "matrix": (3, 3), "6d": (6,), "rotvec": (3,)}
 # Where the arrays of a file start: a multiple of every processor's alignment, and of a cache line.
@@ -76,6 +83,9 @@ class MotionState(_WithWeakReferences[_A]):
     world_rotations: (…, joints, 4).
     velocities: (…, joints, 3), in the world.
     angular_velocities: (…, joints, 3), about the world's axes.
+    dofs: (…, dofs), the scalars of the clips (`MotionLibrary.dof_names`), such as the angles of a robot's joints.
+    dof_velocities: (…, dofs), their derivatives.
+    contacts: (…, contacts), the scalars that are contacts (`MotionLibrary.contact_names`), 0 or 1.
 
     Arrays of a library on a device are `DeviceArray`s.
 
@@ -89,11 +99,14 @@ class MotionState(_WithWeakReferences[_A]):
     world_rotations: _A | None = None
     velocities: _A | None = None
     angular_velocities: _A | None = None
+    dofs: _A | None = None
+    dof_velocities: _A | None = None
+    contacts: _A | None = None
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, MotionState):
             return NotImplemented
-        pairs = [(getattr(self, name), getattr(other, name)) for name in _NAMES]
+        pairs = [(getattr(self, name), getattr(other, name)) for name in _ALL]
         return all(
             first is second
             or first is not None
@@ -112,7 +125,7 @@ if TYPE_CHECKING:
     _Progress: TypeAlias = Callable[[int, int], object] | Any
 
     class _Whole(MotionState[_A]):
-        """A state of which no array was left out."""
+        """A state of which no array of joints was left out."""
 
         rotations: _A
         positions: _A
@@ -128,6 +141,9 @@ if TYPE_CHECKING:
         world_rotations: Any
         velocities: Any
         angular_velocities: Any
+        dofs: Any
+        dof_velocities: Any
+        contacts: Any
 
     class _Rotations(_Some[_A]):
         rotations: _A
@@ -165,6 +181,38 @@ class Skipped:
     message: str
 
 
+@dataclass(slots=True)
+class _Scalars:
+    """Scalars as coordinates of bodies: their tables, names, and the coordinate that each is; or why there are none."""
+
+    motions: Motions | None
+    names: list[str]
+    columns: list[int]
+    reason: str | None = None
+
+    def arrays(self, kind: str, clips: Sequence[int] | None) -> dict[str, Any]:
+        """Everything, as arrays of a file."""
+        if self.motions is None:
+            return {}
+        arrays = self.motions.arrays(clips) | {
+            "names": np.array(self.names, dtype=np.str_),
+            "columns": np.array(self.columns, np.int64),
+        }
+        return {f"{kind}_{name}": array for name, array in arrays.items()}
+
+    @classmethod
+    def of_arrays(cls, kind: str, arrays: dict[str, Any]) -> _Scalars:
+        prefix = f"{kind}_"
+        own = {name.removeprefix(prefix): array for name, array in arrays.items() if name.startswith(prefix)}
+        if not own:
+            return cls(None, [], [])
+        motions = Motions.of_arrays(own)
+        names, columns = [str(name) for name in own["names"]], np.asarray(own["columns"], np.int64)
+        if columns.shape != (len(names),) or ((columns < 0) | (columns >= 3 * motions.joints)).any():
+            raise InputError(f"arrays: the columns of the {kind} are not those of {len(names)} scalars")
+        return cls(motions, names, columns.tolist())
+
+
 class MotionLibrary(Generic[_A]):
     """Clips of one skeleton, of any lengths and rates, which can be sampled at any times.
 
@@ -184,6 +232,9 @@ class MotionLibrary(Generic[_A]):
 
     A clip without offsets, such as an SMPL body without a model of its shape, has rotations only: its positions and
     velocities are refused.
+
+    Scalars that all clips have, such as the angles of a robot's joints, are sampled, too: `dof_names`, and `contact_names`
+    for those that are contacts, which are steps. The other scalars are interpolated by `method`, lines for slerp.
 
     `paths`: the path of the file of each clip; empty for a clip that was not read from one.
 
@@ -272,6 +323,12 @@ class MotionLibrary(Generic[_A]):
         self.rates = np.array([_rate(clips[index]) for index in kept])
         self._engine = engine if engine is not None else Engine()
         self._method = method
+        ticks = self._motions.ticks_per_second
+        used = [clips[index] for index in kept]
+        self._scalars = {
+            kind: _Scalars(*scalar_motions(used, method, ticks, contacts=kind == "contacts"))
+            for kind in ("dofs", "contacts")
+        }
         self._file: str | None = None
         self._only: NDArray[np.int64] | None = None
         self._put_on(device)
@@ -638,12 +695,15 @@ class MotionLibrary(Generic[_A]):
             raise InputError(f"clip_ids and times: their shapes are {shapes}; give shapes that broadcast") from None
         ids = self._ids(np.ascontiguousarray(np.broadcast_to(ids, shape), np.int64).reshape(-1))
         moments = np.ascontiguousarray(np.broadcast_to(moments, shape)).reshape(-1)
-        each = _shapes_of(order, rotations)
+        each = {name: (self._motions.joints, *of) for name, of in _shapes_of(order, rotations).items()}
+        each |= {name: (len(self._scalars[_kind(name)].names),) for name in _SCALARS}
         if isinstance(arrays, str):
             raise TypeError(f'arrays: {arrays!r} is one name; give a list, such as ["{arrays}"]')
         for name in arrays if arrays is not None else ():
-            if name not in _NAMES:
-                raise InputError(f"arrays: there is no `{name}`; there are {', '.join(_NAMES)}")
+            if name not in _ALL:
+                raise InputError(f"arrays: there is no `{name}`; there are {', '.join(_ALL)}")
+            if name in _SCALARS:
+                self._check_scalars(name)
         if self._device is not None:
             if out is not None or order != "xyzw" or rotations != "quaternion":
                 raise InputError(
@@ -652,15 +712,18 @@ class MotionLibrary(Generic[_A]):
                 )
             return self._sampled_on_device(ids, moments, shape, _NAMES if arrays is None else tuple(arrays), finite)
         if out is None:
-            joints = self._motions.joints
-            asked = _NAMES if arrays is None else arrays
-            out = MotionState(**{name: _aligned((*shape, joints, *each[name])) for name in asked})
+            every = (*_NAMES, *(name for name in _SCALARS if self._scalars[_kind(name)].names))
+            asked = every if arrays is None else arrays
+            out = MotionState(**{name: _aligned((*shape, *each[name])) for name in asked})
         elif not isinstance(out, MotionState):
             raise TypeError(f"out: it is of the type {type(out).__name__}; give a MotionState, such as a result of `sample`")
         elif arrays is not None:
             raise InputError("arrays and out: the arrays of `out` are those that are filled; give one of the two")
         else:
-            _check_out(out, shape, self._motions.joints, each)
+            for name in _SCALARS:
+                if getattr(out, name) is not None:
+                    self._check_scalars(name)
+            _check_out(out, shape, each)
         filled = _flat(out, len(shape))
         if rotations == "quaternion":
             self._fill(ids, moments, finite, filled)
@@ -680,7 +743,35 @@ class MotionLibrary(Generic[_A]):
             for array in (out.rotations, out.world_rotations):
                 if array is not None:
                     array[...] = np.roll(array, 1, axis=-1)
+        self._fill_scalars(ids, moments, finite, filled)
         return out
+
+    def _check_scalars(self, name: str) -> None:
+        """Refuses arrays of scalars that a library does not have."""
+        kind = _kind(name)
+        if self._device is not None:
+            raise InputError(f"arrays: {name} are sampled on the CPU; use a library without `device` for them")
+        if not self._scalars[kind].names:
+            reason = self._scalars[kind].reason
+            raise InputError(f"arrays: the library has no {name}" + (f": {reason}" if reason else ""))
+
+    def _fill_scalars(
+        self, ids: NDArray[np.int64], moments: NDArray[np.float64], finite: bool, out: MotionState
+    ) -> None:
+        """Fills the arrays of scalars, (N, scalars)."""
+        for kind, values, rates in (("dofs", out.dofs, out.dof_velocities), ("contacts", out.contacts, None)):
+            scalars = self._scalars[kind]
+            if scalars.motions is None or values is None and rates is None:
+                continue
+            at, speeds = (
+                None if array is None else np.empty((ids.size, scalars.motions.joints, 3), np.float32)
+                for array in (values, rates)
+            )
+            frames = self._frames(ids) if finite and speeds is not None else None
+            scalars.motions.sample(self._engine, ids, moments, None, at, None, speeds, None, frames)
+            for array, found in ((values, at), (rates, speeds)):
+                if array is not None and found is not None:
+                    np.take(found.reshape(ids.size, -1), scalars.columns, axis=1, out=array, mode="clip")
 
     def _frames(self, ids: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """The rates and lengths of the clips in memory, for differences between frames."""
@@ -935,7 +1026,8 @@ class MotionLibrary(Generic[_A]):
         >>> [tumble.MotionLibrary([long], packed=packed).nbytes // (22 * 3000) for packed in (False, True)]
         [16, 8]
         """
-        return sum(array.nbytes for array in self._motions.arrays().values())
+        tables = [self._motions, *(scalars.motions for scalars in self._scalars.values() if scalars.motions is not None)]
+        return sum(array.nbytes for motions in tables for array in motions.arrays().values())
 
     def sample_times(self, clip_ids: ArrayLike, rng: np.random.Generator) -> NDArray[np.float64]:
         """A time within each of these clips, uniformly, in seconds after its first key.
@@ -1024,6 +1116,9 @@ class MotionLibrary(Generic[_A]):
         self.rates = np.asarray(arrays["rates"])
         self._method = str(arrays["method"])
         self._motions = Motions.of_arrays(arrays)
+        self._scalars = {kind: _Scalars.of_arrays(kind, arrays) for kind in ("dofs", "contacts")}
+        if any(one.motions is not None and len(one.motions) != len(self._motions) for one in self._scalars.values()):
+            raise InputError(f"{file or 'arrays'}: its scalars are not those of {len(self._motions)} clips")
         self._engine = engine if engine is not None else Engine()
         self._file = file
         self.skipped = []
@@ -1047,6 +1142,8 @@ class MotionLibrary(Generic[_A]):
         if only is not None and unplaced:
             unplaced = [unplaced[index] for index in only]
         about["unplaced"] = np.array(unplaced, dtype=np.str_)
+        for kind, scalars in self._scalars.items():
+            about |= scalars.arrays(kind, only)
         return {**about, **self._motions.arrays(only)}
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -1066,6 +1163,23 @@ class MotionLibrary(Generic[_A]):
     def joint_names(self) -> list[str]:
         """The names of the joints, in the order of all arrays: those of the skeleton."""
         return self._motions.joint_names
+
+    @property
+    def dof_names(self) -> list[str]:
+        """The names of the scalars in `dofs` and `dof_velocities`, in their order.
+
+        >>> import tumble
+        >>> arm = tumble.Clip([0.0, 1.0], [[0, 0, 0, 1]] * 2, parents=[None], scalars={"elbow": ([0.0, 1.0], [0.0, 2.0])})
+        >>> library = tumble.MotionLibrary([arm])
+        >>> library.dof_names, library.sample(0, 0.25, arrays=["dofs"]).dofs
+        (['elbow'], array([0.5], dtype=float32))
+        """
+        return list(self._scalars["dofs"].names)
+
+    @property
+    def contact_names(self) -> list[str]:
+        """The names of the scalars in `contacts`, in their order."""
+        return list(self._scalars["contacts"].names)
 
     @property
     def method(self) -> str:
@@ -1115,13 +1229,16 @@ def _shapes_of(order: str, rotations: str) -> dict[str, tuple[int, ...]]:
     return {name: _SHAPES[rotations] if name.endswith("rotations") else (3,) for name in _NAMES}
 
 
-def _check_out(
-    out: MotionState, shape: tuple[int, ...], joints: int, each: dict[str, tuple[int, ...]]
-) -> None:
+def _kind(name: str) -> str:
+    """The scalars of an array."""
+    return "contacts" if name == "contacts" else "dofs"
+
+
+def _check_out(out: MotionState, shape: tuple[int, ...], each: dict[str, tuple[int, ...]]) -> None:
     """Refuses arrays of another shape, type or order in memory than results have."""
-    for name in _NAMES:
+    for name in _ALL:
         array = getattr(out, name)
-        expected = (*shape, joints, *each[name])
+        expected = (*shape, *each[name])
         if array is None:
             continue
         if not isinstance(array, np.ndarray):
@@ -1136,7 +1253,7 @@ def _check_out(
 
 def _flat(state: MotionState, axes: int) -> MotionState:
     """The same memory with one axis of instances."""
-    arrays = {name: getattr(state, name) for name in _NAMES}
+    arrays = {name: getattr(state, name) for name in _ALL}
     instances = {name: array for name, array in arrays.items() if array is not None}
     return MotionState(
         **{name: array.reshape(int(np.prod(array.shape[:axes])), *array.shape[axes:]) for name, array in instances.items()}
@@ -1311,7 +1428,7 @@ def _mapped(path: str) -> dict[str, Any]:
     with zipfile.ZipFile(path) as archive, open(path, "rb") as file:
         for info in archive.infolist():
             name = info.filename.removesuffix(".npy")
-            if name not in ("spans", "cells") or info.compress_type != zipfile.ZIP_STORED:
+            if not name.endswith(("spans", "cells")) or info.compress_type != zipfile.ZIP_STORED:
                 with archive.open(info) as member:
                     found[name] = np.lib.format.read_array(member, allow_pickle=False)
                 continue

@@ -73,6 +73,7 @@ __all__ = [
     "rotations_of_six",
     "run",
     "save",
+    "scalar_motions",
     "set_probe",
     "shaped",
     "six",
@@ -1233,6 +1234,9 @@ def shaped(
     tracks: Sequence[str] | Sequence[int] | None = None,
     method: str = "slerp",
 ) -> Clip: ...
+def scalar_motions(
+    clips: Sequence[Clip], method: str, ticks_per_second: int, *, contacts: bool
+) -> tuple[Motions | None, list[str], list[int], str | None]: ...
 def represent(engine: Engine, rotations: _Single, kind: str, out: _Single) -> None: ...
 def clip_of_state(state: dict[str, Any]) -> Clip: ...
 def file_of_state(
@@ -1253,6 +1257,8 @@ class Motions:
     @staticmethod
     def of_arrays(arrays: dict[str, Any]) -> Motions: ...
     def arrays(self, clips: Sequence[int] | None = None) -> dict[str, Any]: ...
+    @property
+    def ticks_per_second(self) -> int: ...
     @property
     def joints(self) -> int: ...
     @property
