@@ -587,7 +587,7 @@ impl FileOptions {
         let are_of_selected =
             are_of_selected.map_err(|fault| input(format!("offsets: {name}: {fault}")))?;
         if let (Some(offsets), false) = (&self.offsets, are_of_selected) {
-            place(&mut loaded, &name, |clip| offsets.of_clip(clip))?;
+            put_offsets(&mut loaded, &name, |clip| offsets.of_clip(clip))?;
         }
         if let Some(model) = &self.body_model {
             let of_clip = |clip| body_offsets(model, clip, Limits::default());
@@ -604,7 +604,7 @@ impl FileOptions {
             }
         }
         if let (Some(offsets), true) = (&self.offsets, are_of_selected) {
-            place(&mut loaded, &name, |clip| {
+            put_offsets(&mut loaded, &name, |clip| {
                 offsets.some_of(clip).of_clip(clip)
             })?;
         }
@@ -631,7 +631,7 @@ impl FileOptions {
 }
 
 /// Sets the offsets of the joints of all clips of a file.
-fn place(
+fn put_offsets(
     loaded: &mut Loaded,
     name: &str,
     offsets: impl Fn(&Motion) -> Result<Vec<f64>, OffsetsError>,

@@ -84,6 +84,9 @@ pub struct MotionTables {
     sizes: (usize, usize),
 }
 
+/// Tables, with the spans and cells that belong to them.
+type SelectedTables = (MotionTables, Vec<[u32; 4]>, Vec<[f32; 4]>);
+
 /// The small tables of [`MotionTables`] as 32-bit words, for files.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct MotionWords {
@@ -209,16 +212,16 @@ impl MotionTables {
             && self.clips.iter().enumerate().all(is_sound_clip)
     }
 
-    /// The tables of some clips alone, in this order, with their spans and cells. They give the same states.
+    /// The tables of some clips alone, each once, in this order, with their spans and cells. They give the same states.
     ///
     /// # Errors
-    /// When a clip does not exist, the spans and cells do not belong to the tables, the tables are not those that a
+    /// When a clip does not exist or is listed twice, the spans and cells do not belong to the tables, the tables are not those that a
     /// [`MotionBuilder`](crate::crowd::MotionBuilder) makes, or there is not enough memory.
     pub fn select(
         &self,
         (spans, cells): (&[[u32; 4]], &[[f32; 4]]),
         clips: &[usize],
-    ) -> Result<(Self, Vec<[u32; 4]>, Vec<[f32; 4]>), CrowdError> {
+    ) -> Result<SelectedTables, CrowdError> {
         const PURPOSE: &str = "some clips of a motion library";
         self.check_parts((spans, cells))?;
         let all_spans: &[CrowdSpan] = bytemuck::cast_slice(spans);
@@ -250,10 +253,8 @@ impl MotionTables {
                 around(of_channels),
             ));
         }
-        let needed = |of: fn(&(usize, Range<usize>, Range<usize>)) -> usize| -> usize {
-            ranges.iter().map(of).sum()
-        };
-        let (span_count, cell_count) = (needed(|it| it.1.len()), needed(|it| it.2.len()));
+        let span_count: usize = ranges.iter().map(|(_, spans, _)| spans.len()).sum();
+        let cell_count: usize = ranges.iter().map(|(_, _, cells)| cells.len()).sum();
         // Clips of a file that share their cells would take more memory than the file.
         if span_count > spans.len() || cell_count > cells.len() {
             return Err(CrowdError::BrokenTables);

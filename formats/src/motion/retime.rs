@@ -81,7 +81,7 @@ pub fn retime(clip: &Motion, speed: f64, start: Option<f64>) -> Result<Motion, R
             let tangents: Vec<_> = keys.tangents.iter().map(faster).collect();
             match channel {
                 Channel::Translation => {
-                    set.set_translations(index, &next(), keys.keys, &tangents)?
+                    set.set_translations(index, &next(), keys.keys, &tangents)?;
                 }
                 Channel::Scale => set.set_scales(index, &next(), keys.keys, &tangents)?,
             }

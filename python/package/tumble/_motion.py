@@ -258,7 +258,7 @@ class MotionLibrary(Generic[_A]):
     lengths: NDArray[np.float64]
     rates: NDArray[np.float64]
     skipped: list[Skipped]
-    _skipped_places: list[int]
+    _skipped_indices: list[int]
 
     @overload
     def __init__(
@@ -316,9 +316,9 @@ class MotionLibrary(Generic[_A]):
         kept = [index for index in range(len(clips)) if index not in left_out]
         self.names = [all_names[index] for index in kept]
         self.paths = [os.fspath(clips[index].path or "") for index in kept]
-        # The place of each clip among those that shards share: in the list, or that of its file among all files.
-        self._places = np.array(kept, np.int64)
-        self._skipped_places = list(left_out)
+        # By these shards divide clips: the index of each in the list, or that of its file among all files.
+        self._shard_indices = np.array(kept, np.int64)
+        self._skipped_indices = list(left_out)
         self.lengths = np.array([clips[index].duration for index in kept])
         self.rates = np.array([_rate(clips[index]) for index in kept])
         self._engine = engine if engine is not None else Engine()
@@ -419,7 +419,7 @@ class MotionLibrary(Generic[_A]):
                 raise FileNotFoundError(f"no file matches {pattern}")
             paths += found
         rank, processes = (0, 1) if shard is None else _rank(shard)
-        places = list(_share(len(paths), rank, processes))
+        share = list(_share(len(paths), rank, processes))
         skip = _skips(on_error)
 
         def read(
@@ -448,8 +448,8 @@ class MotionLibrary(Generic[_A]):
                     clips += [(index, clip) for clip in next(rest).clips]
             return clips, left_out
 
-        with _bar(progress, len(places)) as step:
-            clips, skipped = read(places, step)
+        with _bar(progress, len(share)) as step:
+            clips, skipped = read(share, step)
         if not clips:
             if skipped:
                 raise InputError(f"no file could be read; the first: {skipped[0][1].message}")
@@ -474,9 +474,9 @@ class MotionLibrary(Generic[_A]):
             device=device,
         )
         file_of = np.array([index for index, _ in every], np.int64)
-        made._places = file_of[made._places]
+        made._shard_indices = file_of[made._shard_indices]
         made.skipped = [one for _, one in skipped] + made.skipped
-        made._skipped_places = [index for index, _ in skipped] + [int(file_of[place]) for place in made._skipped_places]
+        made._skipped_indices = [index for index, _ in skipped] + [int(file_of[index]) for index in made._skipped_indices]
         return made if shard is None else made.shard(rank, processes)
 
     def _put_on(self, device: _Device | None) -> None:
@@ -513,14 +513,14 @@ class MotionLibrary(Generic[_A]):
         ['a', 'c']
         """
         rank, processes = _rank((rank, processes))
-        share = np.flatnonzero(self._places % processes == rank)
+        share = np.flatnonzero(self._shard_indices % processes == rank)
         if not share.size:
             raise InputError(f"shard: none of the {len(self)} clips is for process {rank} of {processes}")
         part = self._part(share)
-        part._places = part._places // processes
-        places = [(place, one) for place, one in zip(self._skipped_places, self.skipped) if place % processes == rank]
-        part.skipped = [one for _, one in places]
-        part._skipped_places = [place // processes for place, _ in places]
+        part._shard_indices = part._shard_indices // processes
+        skipped = [(index, one) for index, one in zip(self._skipped_indices, self.skipped) if index % processes == rank]
+        part.skipped = [one for _, one in skipped]
+        part._skipped_indices = [index // processes for index, _ in skipped]
         return part
 
     def _part(self, clips: NDArray[np.int64]) -> MotionLibrary[_A]:
@@ -529,7 +529,7 @@ class MotionLibrary(Generic[_A]):
         part.__dict__.update(self.__dict__)
         part.names = [self.names[index] for index in clips]
         part.paths = [self.paths[index] for index in clips]
-        part.lengths, part.rates, part._places = self.lengths[clips], self.rates[clips], self._places[clips]
+        part.lengths, part.rates, part._shard_indices = self.lengths[clips], self.rates[clips], self._shard_indices[clips]
         part._only = self._ids(clips)
         return part
 
@@ -1109,9 +1109,9 @@ class MotionLibrary(Generic[_A]):
         self.names = [str(name) for name in arrays["names"]]
         clips = len(self.names)
         self.paths = [str(path) for path in arrays["paths"]] if "paths" in arrays else [""] * clips
-        self._places = np.asarray(arrays["places"] if "places" in arrays else np.arange(clips), np.int64)
-        if len(self.paths) != clips or self._places.shape != (clips,):
-            raise InputError(f"{file or 'arrays'}: its paths or places are not those of {clips} clips")
+        self._shard_indices = np.asarray(arrays["shard_indices"] if "shard_indices" in arrays else np.arange(clips), np.int64)
+        if len(self.paths) != clips or self._shard_indices.shape != (clips,):
+            raise InputError(f"{file or 'arrays'}: its paths or shard indices are not those of {clips} clips")
         self.lengths = np.asarray(arrays["lengths"])
         self.rates = np.asarray(arrays["rates"])
         self._method = str(arrays["method"])
@@ -1122,7 +1122,7 @@ class MotionLibrary(Generic[_A]):
         self._engine = engine if engine is not None else Engine()
         self._file = file
         self.skipped = []
-        self._skipped_places = []
+        self._skipped_indices = []
         self._only = np.asarray(arrays["only"]) if "only" in arrays else None
         self._put_on(device)
         return self
@@ -1133,7 +1133,7 @@ class MotionLibrary(Generic[_A]):
             "method": np.array(self._method),
             "names": np.array(self.names, dtype=np.str_),
             "paths": np.array(self.paths, dtype=np.str_),
-            "places": self._places,
+            "shard_indices": self._shard_indices,
             "lengths": self.lengths,
             "rates": self.rates,
             "joint_names": np.array(self.joint_names, dtype=np.str_),
@@ -1148,7 +1148,7 @@ class MotionLibrary(Generic[_A]):
 
     def __reduce__(self) -> tuple[Any, ...]:
         if self._file is not None:
-            return _opened, (self._file, self._engine, self._only, self._device, self._places)
+            return _opened, (self._file, self._engine, self._only, self._device, self._shard_indices)
         return MotionLibrary._of_arrays, (self._arrays(), self._engine, None, self._device)
 
     def __len__(self) -> int:
@@ -1265,13 +1265,13 @@ def _opened(
     engine: Engine,
     only: NDArray[np.int64] | None = None,
     device: Engine | None = None,
-    places: NDArray[np.int64] | None = None,
+    shard_indices: NDArray[np.int64] | None = None,
 ) -> MotionLibrary[Any]:
     library: MotionLibrary[Any] = MotionLibrary.open(file, engine=engine, device=device)
     if only is not None and library._only is None:
         library = library._part(only)
-    if places is not None:
-        library._places = places
+    if shard_indices is not None:
+        library._shard_indices = shard_indices
     return library
 
 
