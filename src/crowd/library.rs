@@ -276,6 +276,38 @@ impl CrowdLibrary {
         Ok(())
     }
 
+    /// Adds an event to a clip and returns the event's index. Crowds that exist already do not have it.
+    ///
+    /// # Errors
+    /// When there is no such clip, or the tick is after its end.
+    pub fn push_event(
+        &mut self,
+        clip: usize,
+        tick: u32,
+        name: impl Into<String>,
+    ) -> Result<usize, CrowdError> {
+        let count = self.clip_count();
+        let Some(ticks) = self.ticks(clip) else {
+            return Err(CrowdError::Missing {
+                subject: "clip",
+                index: clip,
+                count,
+            });
+        };
+        if tick > ticks {
+            return Err(CrowdError::EventTick { tick, ticks });
+        }
+        let name = name.into();
+        self.events.push(ClipEvent { clip, tick, name });
+        Ok(self.events.len() - 1)
+    }
+
+    /// The events of all clips, in the order in which they were added.
+    #[must_use]
+    pub fn events(&self) -> &[ClipEvent] {
+        &self.events
+    }
+
     /// Adds a mask and returns its index. A mask has a weight from 0 to 1 for each joint, by which the weights of
     /// layers are multiplied.
     ///

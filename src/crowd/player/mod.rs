@@ -2,6 +2,7 @@
 
 #[cfg(feature = "vulkan")]
 mod application_device;
+mod events;
 mod visible;
 mod weights;
 
