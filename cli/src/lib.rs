@@ -123,10 +123,11 @@ mod tests {
             }
         }
         assert!(meanings.len() > 100, "{}", meanings.len());
-        for (name, commands) in meanings {
-            assert_eq!(commands.len(), 1, "--{name} means {commands:#?}");
-            assert!(!commands.contains_key(""), "--{name} has no help");
-        }
+        meanings.retain(|_, commands| commands.len() > 1 || commands.contains_key(""));
+        assert!(
+            meanings.is_empty(),
+            "no help, or several meanings: {meanings:#?}"
+        );
     }
 
     /// Options that once had a name of two meanings are still known by it, and go into manifests by their names now.

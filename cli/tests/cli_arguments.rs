@@ -27,7 +27,7 @@ const ARGUMENTS: &str = "
 2 | eval a.dat -o o.npy --start 2 --end 1        | before it starts at 2 s
 2 | eval a.dat -o o.npy --start 5                | before it starts
 2 | eval a.dat -o o.npy --start nan              | invalid time `nan`
-0 | eval a.dat -o o.npy --start -1 --end 1       | keys lie from 0 to 2 s
+0 | eval a.dat -o o.npy --start -1 --end 1       | exceed the keys, 0 to 2 s
 4 | eval a.dat -o o.npy --times none.txt         | none.txt
 2 | eval a.dat -o o.npy --times t.txt --fps 9    | cannot be used with
 2 | eval a.dat -o o.npy -m slerb                 | a similar value exists: 'slerp'
@@ -80,7 +80,7 @@ const ARGUMENTS: &str = "
 4 | verify none.dat                              | none.dat
 3 | info a.dat none.dat                          | none.dat
 2 | generate -o old.npy                          | --overwrite
-2 | generate -o g.dat --boxes 0                  | 1..=65536
+2 | generate -o g.dat --boxes 0                  | from 1 to 65536
 2 | generate -o g.dat --seconds nan              | a number above 0
 2 | generate -o g.dat --keys 1000000000          | 4e-6 s a key
 2 | generate -o g.dat --uniform --random         | cannot be used with
@@ -209,7 +209,7 @@ fn chosen_motion_outside_the_keys_causes_no_warning() {
         let mut line = vec!["eval", "a.dat", "-o", "o.npy", "--overwrite", range];
         line.extend(Some(chosen).filter(|it| !it.is_empty()));
         let run = run(folder.path(), &line);
-        let warns = run.words.contains("keys lie from 0 to 2 s");
+        let warns = run.words.contains("exceed the keys, 0 to 2 s");
         assert_eq!(
             (run.code, warns),
             (0, is_warned),

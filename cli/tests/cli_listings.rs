@@ -284,6 +284,35 @@ fn bench_measures_single_poses() {
     }
 }
 
+#[test]
+fn bench_measures_characters() {
+    let folder = sample_folder();
+    let line = [
+        "bench",
+        "--json",
+        "--rounds",
+        "1",
+        "--shrink",
+        "1000",
+        "characters",
+    ];
+    let report: serde_json::Value =
+        serde_json::from_slice(&succeed(folder.path(), &line).out).unwrap();
+    let section = &report["sections"][0];
+    assert_eq!(section["rotations"], 600);
+    let names: Vec<&str> = (section["rows"].as_array().unwrap().iter())
+        .map(|row| row["name"].as_str().unwrap())
+        .collect();
+    let expected = [
+        "naive (glam, rayon), rotations",
+        "CPU, rotations",
+        "CPU, model matrices",
+    ];
+    assert_eq!(names[..3], expected);
+    let devices = report["devices"].as_array().unwrap().len();
+    assert_eq!(names.len(), 3 + 2 * devices);
+}
+
 /// Everything is measured and reported; speed is not tested.
 #[test]
 fn bench_measures_every_workload_in_one_run() {

@@ -436,7 +436,7 @@ fn an_estimate_beside_its_reference() {
     );
     assert!(
         run.words
-            .contains("--before and --after select the values outside them"),
+            .contains("--before and --after select other values"),
         "{}",
         run.words
     );

@@ -212,7 +212,7 @@ fn what_cannot_be_reduced_is_refused() {
         (
             &["reduce", "walk.bvh", "-o", "a.glb", "--tolerance", "1e-9"],
             4,
-            "give a larger bound",
+            "give a larger tolerance",
         ),
         (&["reduce", "walk.bvh", "-o", "a.npy"], 2, "holds results"),
         (

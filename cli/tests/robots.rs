@@ -505,6 +505,9 @@ fn commands_of_the_guides_run() {
         std::io::Write::write_all(&mut log, &crate::features::npy(shape, &numbers)).unwrap();
     }
     log.finish().unwrap();
+    fs::create_dir(folder.join("data")).unwrap();
+    let arm = crate::program::root().join("data/arm.xml");
+    fs::copy(arm, folder.join("data/arm.xml")).unwrap();
     let mut count = 0;
     for (guide, takes) in [
         ("robots", "take.csv"),

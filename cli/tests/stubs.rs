@@ -89,7 +89,7 @@ fn the_names_in_pythons_stubs_are_those_of_the_engine() {
 fn type_of(option: &InterpolationOption) -> &'static str {
     match option.name {
         _ if option.is_number => "float",
-        "path" => "_KeySigns",
+        "signs" => "_KeySigns",
         "ends" => "_Ends",
         "speed" => "_Speed",
         "before" | "after" => "_Outside",
@@ -177,7 +177,7 @@ fn rust_files(folder: &Path) -> Vec<PathBuf> {
 #[test]
 fn a_missing_option_is_found() {
     let keyword = |option: &InterpolationOption| format!(", {}=None", option.name);
-    let whole = "(method=None, path=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None, out=None)";
+    let whole = "(method=None, signs=None, ends=None, speed=None, before=None, after=None, tension=None, continuity=None, bias=None, out=None)";
     for removed in [", bias=None", ", ends=None"] {
         let text = whole.replace(removed, "");
         assert_eq!(with_all_options(&text, "method=None", keyword).0, whole);

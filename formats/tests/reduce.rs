@@ -326,7 +326,7 @@ fn rotations_of_16_bits_stay_within_the_bounds() {
     };
     let refused = reduce(&clip, &engine, &fine).unwrap_err().to_string();
     assert!(
-        refused.contains("keys are of 16 bits: give a larger bound"),
+        refused.contains("keys are of 16 bits; give a larger tolerance"),
         "{refused}"
     );
 }
@@ -384,7 +384,7 @@ fn bounds_that_f32_cannot_hold_are_refused() {
     };
     let refused = reduce(&clip, &engine, &tiny).unwrap_err().to_string();
     assert!(
-        refused.contains("keys are f32: give a larger bound"),
+        refused.contains("keys are f32; give a larger tolerance"),
         "{refused}"
     );
     for wrong in [-1.0, f64::NAN] {

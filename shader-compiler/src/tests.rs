@@ -63,7 +63,7 @@ fn a_broken_shader_is_an_error() {
 }
 
 #[test]
-#[should_panic(expected = "use only + - * and integers")]
+#[should_panic(expected = "use only + - * on f32, comparisons and integers")]
 fn an_inexact_shader_is_an_error() {
     let source = "@group(0) @binding(0) var<storage, read_write> values: array<f32>;
         @compute @workgroup_size(1) fn main() { values[0] = values[1] / values[2]; }";

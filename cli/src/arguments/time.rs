@@ -34,8 +34,7 @@ const BROADCAST_TOLERANCE: f64 = 2e-4;
 
 #[derive(Debug, Clone, Args)]
 pub(crate) struct SamplingArguments {
-    /// Frames per second, from the first key to the last: a number, a ratio such as 30000/1001, or `source`, the rate
-    /// of the input's keys (25 if they have no rate, or a rate below 10)
+    /// Frames per second: a number, a ratio such as 30000/1001, or `source`, the rate of the input's keys (25 if they have no rate, or a rate below 10)
     #[arg(
         short = 'f',
         long,
@@ -150,7 +149,7 @@ pub(crate) struct KeyTimes {
 /// `--max-gap`: between which keys a clip is not interpolated.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct GapArguments {
-    /// Do not interpolate between keys that are more than SECONDS apart
+    /// The longest gap, seconds: keys that are farther apart are not interpolated
     #[arg(long, value_name = "SECONDS", value_parser = not_negative)]
     max_gap: Option<f64>,
     /// What to do with times between keys that are more than --max-gap apart

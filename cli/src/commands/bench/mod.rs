@@ -2,6 +2,7 @@
 //! would write. Everything is measured in one run, in turns, because machines are
 //! shared and their clocks drift; what counts are the ratios.
 
+pub(crate) mod characters;
 pub(crate) mod device;
 pub(crate) mod files;
 pub(crate) mod follow;
@@ -78,6 +79,10 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
             let shrink = arguments.shrink as usize;
             sections.extend(match kind {
                 WorkloadKind::Smooth => smooth::measure(shrink, repetitions)?,
+                WorkloadKind::Characters => {
+                    let section = characters::measure(shrink, &devices, repetitions);
+                    vec![section.map_err(|error| Failure::new(DEVICE, error.to_string()))?]
+                }
                 WorkloadKind::Poses => poses::measure(shrink, repetitions)
                     .map_err(|error| crate::arguments::device::refused(&error))?,
                 _ => files::measure(shrink, repetitions)?,

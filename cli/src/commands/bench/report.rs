@@ -148,6 +148,11 @@ impl Section {
         Self::with(WorkloadKind::Poses, label, rotations, rows, &LOOPS)
     }
 
+    /// `rows`: the naive peer first.
+    pub(crate) fn of_characters(rotations: usize, rows: Vec<BenchRow>) -> Self {
+        Self::with(WorkloadKind::Characters, "slerp", rotations, rows, &LOOPS)
+    }
+
     /// `rows`: copying first.
     pub(crate) fn of_smoothing(kernel: String, samples: usize, rows: Vec<BenchRow>) -> Self {
         Self::with(WorkloadKind::Smooth, kernel, samples, rows, &COPYING)

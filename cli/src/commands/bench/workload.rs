@@ -31,6 +31,8 @@ pub(crate) enum WorkloadKind {
     Small,
     /// 1 000 000 tracks of 2 keys, one sample each
     Crowd,
+    /// 10 000 characters of 60 joints, each at its own time of one of 8 clips with 61 keys: rotations and model matrices
+    Characters,
     /// 1 track of 10 000 000 keys at 120 Hz, 60 frames a second
     Long,
     /// 100 000 paths of 6 points, 60 frames
@@ -48,7 +50,7 @@ pub(crate) const RATE: f64 = 60.0;
 
 impl WorkloadKind {
     /// Makes the workload with one `shrink`th of its tracks, or of its keys where
-    /// there is one track; none for files, for smoothing and for single poses.
+    /// there is one track; none for characters, for files, for smoothing and for single poses.
     pub(crate) fn workload(self, shrink: usize) -> Option<Workload> {
         let scaled = |count: usize| (count / shrink).max(1);
         Some(match self {
@@ -70,7 +72,7 @@ impl WorkloadKind {
             }
             Self::Crowd => crowd(scaled(1_000_000)),
             Self::Follow => paths(scaled(100_000)),
-            Self::Files | Self::Smooth | Self::Poses => return None,
+            Self::Characters | Self::Files | Self::Smooth | Self::Poses => return None,
         })
     }
 }

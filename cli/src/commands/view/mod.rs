@@ -89,7 +89,7 @@ pub(crate) struct Arguments {
     /// page stays small, else authored,bessel-overhauser,slerp,catmull-rom,b-spline]
     #[arg(short, long = "method", value_name = "METHODS", value_delimiter = ',', value_parser = method_arguments())]
     methods: Vec<MethodArgumentSelection>,
-    /// Frames per second, from the first key to the last: a number or a ratio
+    /// Frames per second: a number or a ratio
     #[arg(
         long,
         value_name = "FPS",
