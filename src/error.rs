@@ -7,7 +7,7 @@ use crate::curve::options::{InterpolationError, Quantity};
 use crate::machine::error::{EvaluateError, VulkanError};
 use crate::memory::OutOfMemoryError;
 use crate::names::UnknownNameError;
-use crate::output::encoding::Encoding;
+use crate::output::encoding::{Encoding, EncodingLengthError};
 use crate::output::pose_error::{PoseError, SkeletonError};
 use crate::path::options::FollowError;
 use crate::prepare::error::SetError;
@@ -40,6 +40,9 @@ pub enum Error {
     /// A crowd cannot be made, changed or evaluated as requested.
     #[error(transparent)]
     Crowd(#[from] CrowdError),
+    /// The memory for encoded rotations has another length.
+    #[error(transparent)]
+    EncodingLength(#[from] EncodingLengthError),
     /// The output is not exactly as long as the result.
     #[error("the output has room for {length} rotations; the result has {needed}")]
     OutputLength {

@@ -1,11 +1,13 @@
 //! A shader of somebody who uses the crate `tumble-exact`: its functions, and sums that drivers like to simplify, compiled by
 //! naga and made exact, have the bits of Rust on every device. Without the pass they do not.
 
-use naga::back::spv;
-use naga::valid::{Capabilities, ValidationFlags, Validator};
+use std::process::Command;
+
 use tumble_exact::{exact, functions};
 
 use crate::application::{Application, ApplicationBuffer};
+use crate::examples::program;
+use crate::spirv::compile;
 
 /// Per argument: sine, cosine, reciprocal, its root, root, arc tangent, a fusible product, and a cancellation.
 const KERNEL: &str = "
@@ -30,11 +32,7 @@ const KERNEL: &str = "
 const WORKGROUP: usize = 64;
 
 fn spirv() -> Vec<u32> {
-    let module = naga::front::wgsl::parse_str(&[KERNEL, functions::WGSL].concat()).unwrap();
-    let info = Validator::new(ValidationFlags::all(), Capabilities::empty())
-        .validate(&module)
-        .unwrap();
-    spv::write_vec(&module, &info, &spv::Options::default(), None).unwrap()
+    compile(&[KERNEL, functions::WGSL].concat())
 }
 
 /// x from 2^-50 to 2^50 and angles up to pi/2, many of each size.
@@ -130,4 +128,42 @@ fn functions_are_within_their_bounds() {
     assert!((0..6).all(|i| worst[i] > bounds[i] / 5.0), "{worst:?}");
     assert_eq!(functions::root(0.0).to_bits(), 0);
     assert_eq!(functions::arc_tangent(0.0, 0.0).to_bits(), 0);
+}
+
+/// The example makes a shader exact as the library does, and lists what cannot be made exact without writing a file.
+#[test]
+fn the_example_writes_exact_shaders_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = |name: &str| folder.path().join(name);
+    let run = |words: &[u32]| {
+        let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
+        std::fs::write(file("shader.spv"), bytes).unwrap();
+        let _ = std::fs::remove_file(file("exact.spv"));
+        let run = Command::new(program("exact"))
+            .args([file("shader.spv"), file("exact.spv")])
+            .output()
+            .unwrap();
+        let written = std::fs::read(file("exact.spv")).ok();
+        (
+            run.status.success(),
+            written,
+            String::from_utf8(run.stderr).unwrap(),
+        )
+    };
+    let plain = spirv();
+    let (is_done, written, words) = run(&plain);
+    assert!(is_done, "{words}");
+    assert_eq!(
+        bytemuck::pod_collect_to_vec::<u8, u32>(&written.unwrap()),
+        exact(&plain).unwrap()
+    );
+    let inexact = KERNEL
+        .replace("= reciprocal(x)", "= 1.0 / x")
+        .replace("= root(x)", "= sqrt(x)");
+    let (is_done, written, words) = run(&compile(&[&inexact, functions::WGSL].concat()));
+    assert!(!is_done && written.is_none());
+    assert!(
+        words.contains("OpFDiv") && words.contains("Sqrt"),
+        "{words}"
+    );
 }

@@ -6,10 +6,16 @@ use std::process::Command;
 use crate::support::vulkan_devices;
 
 /// A program that was built beside this one.
-fn program(name: &str) -> PathBuf {
+pub(crate) fn program(name: &str) -> PathBuf {
     let tests = std::env::current_exe().unwrap();
     let folder = tests.parent().unwrap().parent().unwrap().join("examples");
-    folder.join(format!("{name}{}", std::env::consts::EXE_SUFFIX))
+    let program = folder.join(format!("{name}{}", std::env::consts::EXE_SUFFIX));
+    let is_built = program.exists();
+    assert!(
+        is_built,
+        "{name} is not built: `cargo build --workspace --examples` builds it"
+    );
+    program
 }
 
 #[test]
@@ -36,13 +42,10 @@ fn every_example_runs_and_says_what_it_found() {
             "same_bits" => (&[], ""),
             _ => panic!("{name}: say here what it prints"),
         };
-        let program = program(name);
-        let built = program.exists();
-        assert!(
-            built,
-            "{name} is not built: `cargo test -p tumble` without --test builds it"
-        );
-        let run = Command::new(program).args(arguments).output().unwrap();
+        let run = Command::new(program(name))
+            .args(arguments)
+            .output()
+            .unwrap();
         let (out, words) = (
             String::from_utf8_lossy(&run.stdout),
             String::from_utf8_lossy(&run.stderr),

@@ -9,7 +9,7 @@ use naga::valid::{Capabilities, ValidationFlags, Validator};
 use proptest::prelude::*;
 use tumble_exact::{
     FloatControls, PassError, SpirvError, exact, float_controls, inexact, no_contraction,
-    no_contraction_of_halves, nontemporal_stores, splat_products, texel_buffers,
+    no_contraction_with_f16, nontemporal_stores, splat_products, texel_buffers,
     without_decorations, workgroup_layouts,
 };
 
@@ -47,7 +47,7 @@ fn instructions(module: &[u32]) -> Vec<(u16, Vec<u32>)> {
     found
 }
 
-fn compile(wgsl: &str) -> Vec<u32> {
+pub(crate) fn compile(wgsl: &str) -> Vec<u32> {
     let module = naga::front::wgsl::parse_str(wgsl).expect(wgsl);
     let info = Validator::new(ValidationFlags::all(), Capabilities::all())
         .validate(&module)
@@ -221,7 +221,7 @@ fn every_inexact_operation_is_listed() {
         ..spv::Options::default()
     };
     let words = spv::write_vec(&module, &info, &options, None).unwrap();
-    let found = inexact(&words, false).unwrap();
+    let found = inexact(&words).unwrap();
     let found: Vec<_> = found.iter().map(|one| (&*one.name, one.line)).collect();
     assert_eq!(found, [("OpFDiv", Some(4)), ("Sqrt", Some(6))]);
     let error = exact(&words).unwrap_err().to_string();
@@ -239,7 +239,7 @@ fn every_inexact_operation_is_listed() {
         words.push(1);
         words.extend(name);
         words.extend([5 << 16 | 12, 2, 3, 1, 1]);
-        inexact(&words, false).unwrap().len()
+        inexact(&words).unwrap().len()
     };
     assert_eq!(imported("NonSemantic.DebugPrintf"), 0);
     assert_eq!(imported("GLSL.std.999"), 1);
@@ -400,7 +400,7 @@ fn conversions_to_halves_ask_for_their_rounding() {
         "@group(0) @binding(0) var<storage, read_write> values: array<f64>;
          @compute @workgroup_size(1) fn main() { values[0] = f64(f32(values[1])); }",
     );
-    let double = no_contraction_of_halves(&double);
+    let double = no_contraction_with_f16(&double);
     assert_eq!(refused(double), "a float of 64 bits");
     let found = |module: &[u32]| {
         let all = instructions(module);
@@ -410,7 +410,7 @@ fn conversions_to_halves_ask_for_their_rounding() {
         (conversions, MODES.map(has))
     };
     assert_eq!(
-        found(&no_contraction_of_halves(&module).unwrap()),
+        found(&no_contraction_with_f16(&module).unwrap()),
         (1, [true; 2])
     );
     let mut converting = 0;

@@ -21,7 +21,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         return Err(format!("{input}: {} bytes are not whole words", bytes.len()).into());
     }
     let words: Vec<u32> = words.iter().map(|&word| u32::from_le_bytes(word)).collect();
-    let found = inexact(&splat_products(&words)?, false)?;
+    let found = inexact(&splat_products(&words)?)?;
     if !found.is_empty() {
         let list: Vec<String> = found.iter().map(|one| format!("{input}: {one}")).collect();
         return Err(list.join("\n").into());

@@ -25,7 +25,7 @@
 //! let spirv = naga::back::spv::write_vec(&module, &info, &Default::default(), None)?;
 //!
 //! let same_everywhere = tumble_exact::exact(&spirv)?;
-//! assert!(tumble_exact::inexact(&same_everywhere, false)?.is_empty());
+//! assert!(tumble_exact::inexact(&same_everywhere)?.is_empty());
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
@@ -45,9 +45,9 @@ mod pass;
 pub mod spirv;
 
 pub use crate::controls::{FloatControls, float_controls, without_decorations};
-pub use crate::operations::{Inexact, inexact};
+pub use crate::operations::{InexactOperation, inexact};
 pub use crate::pass::{
-    PassError, exact, no_contraction, no_contraction_of_halves, nontemporal_stores, splat_products,
+    PassError, exact, no_contraction, no_contraction_with_f16, nontemporal_stores, splat_products,
     texel_buffers, workgroup_layouts,
 };
 pub use crate::spirv::SpirvError;

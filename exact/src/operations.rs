@@ -3,12 +3,12 @@
 use std::collections::BTreeSet;
 use std::fmt;
 
-use crate::spirv::{SpirvError, instructions, op, text_of};
+use crate::spirv::{Instruction, SpirvError, instructions, op, text_of};
 
 /// An operation whose result may differ from driver to driver.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
-pub struct Inexact {
+pub struct InexactOperation {
     /// The offset of the instruction in the module, in words.
     pub word: usize,
     /// The opcode of the instruction.
@@ -19,7 +19,7 @@ pub struct Inexact {
     pub line: Option<u32>,
 }
 
-impl fmt::Display for Inexact {
+impl fmt::Display for InexactOperation {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self {
             word, name, line, ..
@@ -172,21 +172,33 @@ const FUNCTIONS: [&str; 81] = [
 /// the pass accepts the module, except for products of vectors and scalars, which [`exact`](crate::exact) replaces.
 ///
 /// Exact are `+ - *` and the sign of f32, comparisons, selections, integers, bits, and moves of values. A float type of
-/// another width than 32 bits is listed once; if `has_halves`, 16 bits and conversions are accepted, because
-/// [`no_contraction_of_halves`](crate::no_contraction_of_halves) asks for their rounding. Conversions of integers to f32 are
-/// accepted: they are exact below 2^24, and the shader has to see to that.
+/// another width than 32 bits is listed once. Conversions of integers to f32 are accepted: they are exact below 2^24, and the
+/// shader has to see to that.
 ///
 /// # Errors
 /// A [`SpirvError`] for words that are no module.
-pub fn inexact(module: &[u32], has_halves: bool) -> Result<Vec<Inexact>, SpirvError> {
+pub fn inexact(module: &[u32]) -> Result<Vec<InexactOperation>, SpirvError> {
+    Ok(found(&instructions(module)?, HalfFloats::Refused))
+}
+
+/// Floats of 16 bits, and conversions to them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum HalfFloats {
+    Refused,
+    /// The module states their rounding.
+    Accepted,
+}
+
+/// The inexact operations among instructions, in their order.
+pub(crate) fn found(code: &[Instruction<'_>], halves: HalfFloats) -> Vec<InexactOperation> {
     const LINE: u16 = 8;
     const NO_LINE: u16 = 317;
     const FUNCTION_END: u16 = 56;
     // The sets of extended instructions: those that compute nothing, and that of GLSL.
     let (mut silent, mut glsl) = (BTreeSet::new(), BTreeSet::new());
     let mut line = None;
-    let mut found = Vec::new();
-    for instruction in instructions(module)? {
+    let mut all = Vec::new();
+    for instruction in code {
         let opcode = instruction.opcode;
         let name = match (opcode, instruction.words) {
             (LINE, &[_, _, number, ..]) => {
@@ -217,21 +229,23 @@ pub fn inexact(module: &[u32], has_halves: bool) -> Result<Vec<Inexact>, SpirvEr
                 false => Some("a function of an unknown set".to_owned()),
             },
             (op::EXT_INST, _) => Some("a function without a name".to_owned()),
-            (op::TYPE_FLOAT, &[_, _, bits, ..]) if bits != 32 && !(bits == 16 && has_halves) => {
+            (op::TYPE_FLOAT, &[_, _, bits, ..])
+                if bits != 32 && !(bits == 16 && halves == HalfFloats::Accepted) =>
+            {
                 Some(format!("a float of {bits} bits"))
             }
-            (op::F_CONVERT, _) if has_halves => None,
+            (op::F_CONVERT, _) if halves == HalfFloats::Accepted => None,
             _ => OPERATIONS
                 .iter()
                 .find(|(inexact, _)| *inexact == opcode)
                 .map(|(_, name)| (*name).to_owned()),
         };
-        found.extend(name.map(|name| Inexact {
+        all.extend(name.map(|name| InexactOperation {
             word: instruction.start,
             opcode,
             name,
             line,
         }));
     }
-    Ok(found)
+    all
 }

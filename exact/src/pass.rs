@@ -10,7 +10,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::controls::{Mode, with_modes};
-use crate::operations::{Inexact, inexact};
+use crate::operations::{HalfFloats, InexactOperation, found};
 use crate::spirv::{HEADER_WORDS, SpirvError, instruction_word, instructions, op};
 
 /// The decoration.
@@ -30,7 +30,7 @@ pub enum PassError {
     Spirv(#[from] SpirvError),
     /// An operation whose result Vulkan does not define to the last bit. [`inexact`](crate::inexact) lists all of them.
     #[error("{0}; use only + - * on f32, comparisons and integers")]
-    Inexact(Inexact),
+    Inexact(InexactOperation),
     /// A type that a buffer and a workgroup share, of which one needs a layout that the other forbids.
     #[error(
         "type %{id} is used in a buffer and in workgroup memory; declare one of its own for each"
@@ -59,7 +59,7 @@ pub fn exact(module: &[u32]) -> Result<Vec<u32>, PassError> {
 /// A [`PassError`] for words that are no module, and for a module that computes
 /// anything whose last bit Vulkan leaves open.
 pub fn no_contraction(module: &[u32]) -> Result<Vec<u32>, PassError> {
-    decorated(module, false)
+    decorated(module, HalfFloats::Refused)
 }
 
 /// As [`no_contraction`], for a module that converts f32 to half precision. It gets the modes by which conversions round
@@ -67,10 +67,10 @@ pub fn no_contraction(module: &[u32]) -> Result<Vec<u32>, PassError> {
 ///
 /// # Errors
 /// As for [`no_contraction`].
-pub fn no_contraction_of_halves(module: &[u32]) -> Result<Vec<u32>, PassError> {
+pub fn no_contraction_with_f16(module: &[u32]) -> Result<Vec<u32>, PassError> {
     const DENORM_PRESERVE: [u32; 2] = [4464, 4459]; // the capability and the mode
     const ROUND_TO_NEAREST_EVEN: [u32; 2] = [4467, 4462];
-    let words = decorated(module, true)?;
+    let words = decorated(module, HalfFloats::Accepted)?;
     let modes = [DENORM_PRESERVE, ROUND_TO_NEAREST_EVEN].map(|[capability, mode]| Mode {
         capability,
         mode,
@@ -79,11 +79,11 @@ pub fn no_contraction_of_halves(module: &[u32]) -> Result<Vec<u32>, PassError> {
     Ok(with_modes(&words, &modes)?)
 }
 
-fn decorated(module: &[u32], converts: bool) -> Result<Vec<u32>, PassError> {
-    if let Some(first) = inexact(module, converts)?.into_iter().next() {
+fn decorated(module: &[u32], halves: HalfFloats) -> Result<Vec<u32>, PassError> {
+    let code = instructions(module)?;
+    if let Some(first) = found(&code, halves).into_iter().next() {
         return Err(PassError::Inexact(first));
     }
-    let code = instructions(module)?;
     let mut results = BTreeSet::new();
     let mut decorated = BTreeSet::new();
     for instruction in &code {

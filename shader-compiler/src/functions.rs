@@ -15,12 +15,13 @@ use std::fmt::Write as _;
 use std::io::Write as _;
 use std::process::{Command, Stdio};
 
-use crate::rust::Declared;
 use naga::valid::{FunctionInfo, ModuleInfo};
 use naga::{
     ArraySize, BinaryOperator, Block, Expression, Function, Handle, Literal, LocalVariable, Module,
     ScalarKind, Statement, StructMember, Type, TypeInner, UnaryOperator, VectorSize,
 };
+
+use crate::rust::Declared;
 
 /// The functions that are written, each with its cut: the names of `let` after which a pipelined loop interrupts it.
 /// A function `f` with a cut is written as `f_begin` and `f_end`, too.

@@ -27,7 +27,7 @@ use naga::front::wgsl::{Frontend, Options};
 use naga::valid::{Capabilities, GlobalUse, ModuleInfo, ValidationFlags, Validator};
 use naga::{Binding, BuiltIn};
 use tumble_exact::{
-    PassError, no_contraction, no_contraction_of_halves, nontemporal_stores, splat_products,
+    PassError, no_contraction, no_contraction_with_f16, nontemporal_stores, splat_products,
     texel_buffers, workgroup_layouts,
 };
 
@@ -334,7 +334,7 @@ impl Module {
             let words = workgroup_layouts(&words)?;
             let words = splat_products(&words)?;
             let words = match converts {
-                true => no_contraction_of_halves(&words)?,
+                true => no_contraction_with_f16(&words)?,
                 false => no_contraction(&words)?,
             };
             match streams_results {

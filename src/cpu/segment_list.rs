@@ -3,7 +3,7 @@
 
 use crate::cpu::evaluate::distances;
 use crate::cpu::streaming::Samples;
-use crate::prepare::packed::{PackedSegment, PackedSegments};
+use crate::prepare::packed::{PackedSegments, of_degree};
 use crate::simd::lanes::Lanes;
 use crate::time::runs::Affine;
 use crate::twin::Evaluate;
@@ -74,7 +74,6 @@ impl<S: Evaluate> SegmentList for [S] {
     }
 }
 
-// Written out: closures are not always inlined.
 impl SegmentList for PackedSegments {
     #[inline(always)]
     fn frames<L: Lanes, O: Samples + ?Sized>(
@@ -86,11 +85,7 @@ impl SegmentList for PackedSegments {
         count: usize,
         output: &mut O,
     ) {
-        match self.get(index) {
-            PackedSegment::Degree6(it) => output.frames::<L, _>(it, affine, first, start, count),
-            PackedSegment::Degree8(it) => output.frames::<L, _>(it, affine, first, start, count),
-            PackedSegment::Degree10(it) => output.frames::<L, _>(it, affine, first, start, count),
-        }
+        of_degree!(self.get(index), segment => output.frames::<L, _>(segment, affine, first, start, count));
     }
 
     #[inline(always)]
@@ -102,17 +97,7 @@ impl SegmentList for PackedSegments {
         output: &mut [[f32; 4]],
     ) {
         let count = output.len();
-        match self.get(index) {
-            PackedSegment::Degree6(it) => {
-                distances::<L, _>(it, affine, from_middle, count, output);
-            }
-            PackedSegment::Degree8(it) => {
-                distances::<L, _>(it, affine, from_middle, count, output);
-            }
-            PackedSegment::Degree10(it) => {
-                distances::<L, _>(it, affine, from_middle, count, output);
-            }
-        }
+        of_degree!(self.get(index), segment => distances::<L, _>(segment, affine, from_middle, count, output));
     }
 
     #[inline(always)]
@@ -122,16 +107,6 @@ impl SegmentList for PackedSegments {
         parameters: impl Iterator<Item = f32>,
         output: &mut [[f32; 4]],
     ) {
-        match self.get(index) {
-            PackedSegment::Degree6(it) => {
-                std::slice::from_ref(it).values_at(0, parameters, output);
-            }
-            PackedSegment::Degree8(it) => {
-                std::slice::from_ref(it).values_at(0, parameters, output);
-            }
-            PackedSegment::Degree10(it) => {
-                std::slice::from_ref(it).values_at(0, parameters, output);
-            }
-        }
+        of_degree!(self.get(index), segment => std::slice::from_ref(segment).values_at(0, parameters, output));
     }
 }

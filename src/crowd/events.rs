@@ -70,7 +70,7 @@ impl Passages {
                 ([Some(tick), (!is_end).then_some(back)], Some(2 * period))
             }
         };
-        let position = clip_position(entry, clock);
+        let position = clip_position(entry, clock, 0);
         // Whole ticks: forwards the position reaches a tick at its beginning, and backwards at its end.
         let (position, end_of_tick) = match backwards {
             true => (-position, 0xffff),
@@ -127,7 +127,7 @@ mod tests {
         tick: i128,
         [since, clock]: [u64; 2],
     ) -> Vec<u64> {
-        let whole = |clock| clip_position(entry, clock) >> 16;
+        let whole = |clock| clip_position(entry, clock, 0) >> 16;
         let is_event = |x: i128| match wrap {
             WrapMode::Hold => x == tick,
             WrapMode::Loop => x.rem_euclid(period) == tick % period,

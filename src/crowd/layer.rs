@@ -149,7 +149,7 @@ impl CrowdLayer {
         let backwards = modes & RUNS_BACKWARDS != 0;
         let clip = (entry.clip_and_weight & 0xffff) as usize;
         let (wrap, period) = ((modes >> 29) & 3, clips[clip].period);
-        let later = position_later(entry, clock, i128::from(to) - i128::from(clock));
+        let later = clip_position(entry, clock, i128::from(to) - i128::from(clock));
         let ticks = later >> 16;
         let speed = units as f32 / SPEED_UNITS;
         Self {
@@ -168,13 +168,9 @@ impl CrowdLayer {
     }
 }
 
-/// The position of an entry at a time of the clock that is not before its anchor: the time in the clip before wrapping, in units of 2^-16 ticks.
-pub(crate) fn clip_position(entry: &CrowdEntry, clock: u64) -> i128 {
-    position_later(entry, clock, 0)
-}
-
-/// The position of an entry some ticks later than a time of the clock, or before.
-fn position_later(entry: &CrowdEntry, clock: u64, ticks: i128) -> i128 {
+/// The position of an entry: its time in the clip before wrapping, in units of 2^-16 ticks. It is that of `ticks` ticks after
+/// the time `clock`, which is not before the entry's anchor; negative ticks are before it.
+pub(crate) fn clip_position(entry: &CrowdEntry, clock: u64, ticks: i128) -> i128 {
     let modes = entry.speed_and_modes;
     let units = i128::from(modes & SPEED_MAGNITUDE);
     let is_backwards = modes & RUNS_BACKWARDS != 0;

@@ -10,10 +10,10 @@ use crate::output::encoding::{Encoding, MatrixOrder};
 const TASK: usize = 256;
 
 /// The numbers of a matrix.
-const MATRIX: usize = 9;
+const MATRIX_NUMBERS: usize = 9;
 
-/// The numbers of two columns or rows.
-const TWO: usize = 6;
+/// The numbers of the first two columns or rows of a matrix.
+const PAIR_NUMBERS: usize = 6;
 
 impl Engine {
     /// Stores the matrices of rotations, `x y z w` each, or only the first two columns or rows of each: models that learn
@@ -37,26 +37,26 @@ impl Engine {
         order: MatrixOrder,
         output: &mut [f32],
     ) -> Result<(), Error> {
-        let numbers = match output.len() == TWO * rotations.len() {
-            true => TWO,
-            false => MATRIX,
-        };
-        if output.len() != numbers * rotations.len() {
-            return Err(Error::OutputLength {
-                length: output.len() / MATRIX,
-                needed: rotations.len(),
-            });
-        }
         let encoding = Encoding::Matrix3x3(order);
+        let is_of_pairs = output.len() == PAIR_NUMBERS * rotations.len();
+        if !is_of_pairs {
+            encoding.check_length(rotations.len(), size_of_val(output))?;
+        }
+        let numbers = if is_of_pairs {
+            PAIR_NUMBERS
+        } else {
+            MATRIX_NUMBERS
+        };
         let task = |(rotations, output): (&[[f32; 4]], &mut [f32])| {
-            if numbers == MATRIX {
+            if !is_of_pairs {
                 encoding.encode_all(rotations, bytemuck::cast_slice_mut(output));
                 return;
             }
-            let matrices = &mut [[0.0_f32; MATRIX]; TASK][..rotations.len()];
+            let matrices = &mut [[0.0_f32; MATRIX_NUMBERS]; TASK][..rotations.len()];
             encoding.encode_all(rotations, bytemuck::cast_slice_mut(matrices));
-            for (two, matrix) in output.as_chunks_mut::<TWO>().0.iter_mut().zip(&*matrices) {
-                two.copy_from_slice(&matrix[..TWO]);
+            let pairs = output.as_chunks_mut::<PAIR_NUMBERS>().0;
+            for (pair, matrix) in pairs.iter_mut().zip(&*matrices) {
+                pair.copy_from_slice(&matrix[..PAIR_NUMBERS]);
             }
         };
         if rotations.len() <= TASK {

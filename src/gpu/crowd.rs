@@ -121,7 +121,7 @@ impl DeviceCrowd {
         let range = info
             .max_storage_buffer_range
             .min(info.max_memory_allocation_size);
-        let budget = self.engine.clip_bytes.map_or(range, |bytes| bytes as u64);
+        let budget = self.engine.clip_bytes().map_or(range, |bytes| bytes as u64);
         let mut range = range.min(budget);
         if info.kind == DeviceKind::Cpu {
             // On software devices, windows are small, so that every kernel finds the window in the processor's cache.

@@ -44,7 +44,7 @@ impl Machine for Opened {
             kind: MachineKind::Device {
                 window: engine.window(),
             },
-            memory: engine.clip_bytes,
+            memory: engine.clip_bytes(),
             group_bytes: Some(engine.group_bytes),
             prepares_arcs_from: Some(arcs_from).filter(|&from| from < usize::MAX),
             kept_segments: None,

@@ -144,7 +144,10 @@ impl ResidentMotions {
                 limit,
             });
         }
-        if let Some(budget) = engine.budget.filter(|budget| bytes > budget / 2) {
+        if let Some(budget) = engine
+            .budget
+            .filter(|_| engine.clip_bytes().is_some_and(|room| bytes > room as u64))
+        {
             return Err(VulkanError::OverBudget {
                 subject,
                 bytes,

@@ -4,13 +4,13 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use ash::vk;
+use tumble_exact::{float_controls, without_decorations};
 
 use crate::gpu::device::LogicalDevice;
 use crate::machine::error::VulkanError;
 use crate::machine::error::calls::Named;
 use crate::shader::{Access, Kernel, spirv};
 use crate::work::recording::MAX_PUSHED;
-use tumble_exact::{float_controls, without_decorations};
 
 /// A compute pipeline with its layouts.
 pub(crate) struct Pipeline {

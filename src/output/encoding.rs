@@ -463,7 +463,11 @@ impl Encoding {
         Ok(self.decode_one(bytes))
     }
 
-    fn check_length(self, rotations: usize, bytes: usize) -> Result<(), EncodingLengthError> {
+    pub(crate) fn check_length(
+        self,
+        rotations: usize,
+        bytes: usize,
+    ) -> Result<(), EncodingLengthError> {
         let needed = rotations.saturating_mul(self.bytes());
         if bytes == needed {
             Ok(())

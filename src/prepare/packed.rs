@@ -23,6 +23,19 @@ pub(crate) enum PackedSegment<'a> {
     Degree10(&'a Polynomial<POWERS>),
 }
 
+/// An expression for a packed segment, compiled for the type of each degree. A macro, because closures are not always
+/// inlined.
+macro_rules! of_degree {
+    ($packed:expr, $segment:ident => $value:expr) => {
+        match $packed {
+            $crate::prepare::packed::PackedSegment::Degree6($segment) => $value,
+            $crate::prepare::packed::PackedSegment::Degree8($segment) => $value,
+            $crate::prepare::packed::PackedSegment::Degree10($segment) => $value,
+        }
+    };
+}
+pub(crate) use of_degree;
+
 /// The index of a packed segment: its first row and, in the bits above, its degree.
 #[derive(Clone, Copy)]
 struct PackedIndex(u32);
@@ -76,17 +89,14 @@ impl PackedSegments {
     #[inline(always)]
     fn rows<const ROWS: usize>(&self, row: usize) -> &Polynomial<ROWS> {
         let rows = self.0[row..row + ROWS].first_chunk();
-        rows.unwrap_or(const { &[[0.0; 4]; ROWS] }) // there are so many
+        // Never the zeros, because the slice has `ROWS` rows; the compiler sees no panic here.
+        rows.unwrap_or(const { &[[0.0; 4]; ROWS] })
     }
 
     /// The value of a segment at a parameter.
     #[inline(always)]
     pub(crate) fn value_at(&self, index: u32, parameter: f32) -> [f32; 4] {
-        match self.get(index) {
-            PackedSegment::Degree6(segment) => segment.value_at(parameter),
-            PackedSegment::Degree8(segment) => segment.value_at(parameter),
-            PackedSegment::Degree10(segment) => segment.value_at(parameter),
-        }
+        of_degree!(self.get(index), segment => segment.value_at(parameter))
     }
 }
 

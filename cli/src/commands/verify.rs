@@ -30,7 +30,7 @@ Every rotation of every frame is computed three times: on the device, by the eng
 a textbook implementation in f64. The bits of the first two must be equal, and the error against the \
 third must be within a bound. Velocities, accelerations and every encoding are compared in the same \
 way. The exit code is 8 if a comparison fails. Without --device, the device is the first Vulkan device, \
-of whatever number of rotations (not `auto`, as in other commands). If \
+however few rotations there are (other commands take `auto`). If \
 there is none, only the CPU is compared with f64, and the exit code is 5. With --device cpu this \
 comparison is enough, and the exit code is 0.
 

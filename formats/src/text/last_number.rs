@@ -53,10 +53,13 @@ fn last_number(line: &[u8]) -> Option<(usize, usize)> {
     let is_comment = line.trim_ascii_start().starts_with(b"#");
     let is_between = |byte: &u8| matches!(byte, b' ' | b'\t' | b',' | b';');
     let start = line.iter().rposition(is_between).map_or(0, |at| at + 1);
-    let number = std::str::from_utf8(&line[start..]).ok()?;
-    let is_number = !is_comment && number.parse::<f64>().is_ok_and(f64::is_finite);
-    let (_, after_point) = number.split_once('.').unwrap_or_default();
-    let decimals = after_point.bytes().take_while(u8::is_ascii_digit).count();
+    let number = &line[start..];
+    // Not parsed, because each line passes here: readers refuse what is no number.
+    let is_part = |byte: &u8| byte.is_ascii_digit() || b"+-.eE".contains(byte);
+    let is_number =
+        !is_comment && number.iter().all(is_part) && number.iter().any(u8::is_ascii_digit);
+    let after_point = number.iter().skip_while(|&&byte| byte != b'.').skip(1);
+    let decimals = after_point.take_while(|byte| byte.is_ascii_digit()).count();
     is_number.then_some((start, decimals))
 }
 

@@ -61,7 +61,8 @@ impl Crowd {
                 })
             })
         };
-        let count: u64 = passages().map(|(.., passages)| passages.count).sum();
+        let counts = passages().map(|(.., passages)| passages.count);
+        let count = counts.fold(0, u64::saturating_add);
         let mut passed = reserved(usize::try_from(count).unwrap_or(usize::MAX), "events")?;
         for (index, event, passages) in passages() {
             let weight = (self.instances.entries[index].clip_and_weight >> 16) as f32 * WEIGHT_UNIT;

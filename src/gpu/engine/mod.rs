@@ -13,6 +13,7 @@ use std::sync::{Arc, Mutex};
 
 use ash::vk;
 use glam::Quat;
+use tumble_exact::FloatControls;
 
 use crate::cpu::engine::CpuEngine;
 use crate::gpu::buffer::{Buffer, Residence};
@@ -45,7 +46,6 @@ use crate::simd::dispatch::VectorWidth;
 use crate::threads::exclusive::Exclusive;
 use crate::threads::{copy, lock};
 use crate::work::lists::ListRequest;
-use tumble_exact::FloatControls;
 
 /// The number of rotations of one window, 32 MiB, unless the device's limits, the memory budget or the device's speed
 /// require fewer.
@@ -83,8 +83,6 @@ pub(crate) struct VulkanEngine {
     pub(crate) window: AtomicUsize,
     /// Bytes that the segments of one buffer may take.
     pub(crate) group_bytes: usize,
-    /// Bytes that the segments of one clip may take on the device, half of the budget; `None` without a memory budget.
-    pub(crate) clip_bytes: Option<usize>,
     /// The memory budget, bytes.
     pub(crate) budget: Option<u64>,
     /// Whether kernels that differ from the CPU are used nevertheless.
@@ -96,6 +94,12 @@ pub(crate) struct VulkanEngine {
 }
 
 impl VulkanEngine {
+    /// Bytes that the segments of one clip may take on the device, half of the budget; `None` without a memory budget.
+    pub(crate) fn clip_bytes(&self) -> Option<usize> {
+        let half = self.budget.map(|budget| budget / 2);
+        half.map(|bytes| usize::try_from(bytes).unwrap_or(usize::MAX))
+    }
+
     /// Makes an engine on an open device, whose exactness was not tested yet.
     pub(crate) fn new(device: Arc<LogicalDevice>, options: &EngineOptions) -> Self {
         let info = &device.physical.info;
@@ -130,7 +134,6 @@ impl VulkanEngine {
             imports: options.transfer == Transfer::Automatic,
             window: AtomicUsize::new(window),
             group_bytes: bytes(half.map_or(largest, |half| half.min(largest))),
-            clip_bytes: half.map(bytes),
             budget: options.memory,
             allow_inexact: options.allow_inexact,
             free: Arc::default(),
@@ -371,7 +374,7 @@ impl VulkanEngine {
         spare: Option<ClipBuffers>,
     ) -> Result<ClipBuffers, VulkanError> {
         // With a memory limit, the old buffers are freed before new ones are allocated.
-        let spare = spare.filter(|old| self.clip_bytes.is_none() && self.owns(old));
+        let spare = spare.filter(|old| self.budget.is_none() && self.owns(old));
         let spare = spare.into_iter().flat_map(|buffers| buffers.groups);
         let (mut segments_of, mut constants_of): (Vec<Buffer>, Vec<Buffer>) = spare.unzip();
         let groups = clip

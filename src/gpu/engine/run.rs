@@ -73,7 +73,7 @@ impl VulkanEngine {
         whole: &Window,
         values_per_window: usize,
     ) -> Result<Option<Arc<KeptLists>>, EvaluateError> {
-        if self.clip_bytes.is_some() {
+        if self.budget.is_some() {
             return Ok(None);
         }
         let request = self.list_request(job);

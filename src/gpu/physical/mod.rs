@@ -13,6 +13,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use ash::{ext, khr, vk};
+use tumble_exact::FloatControls;
 
 use crate::gpu::instance::{self, Instance};
 use crate::gpu::physical::queues::{Copies, check_family, compute_family, copies};
@@ -23,7 +24,6 @@ use crate::machine::error::calls::Named;
 use crate::machine::options::{EngineOptions, Mapping, Reads, Transfer};
 pub(crate) use crate::machine::reports::{DeviceInfo, DeviceKind};
 use crate::shader::MAX_SUBGROUP_POSITIONS;
-use tumble_exact::FloatControls;
 
 /// Bytes of one texel of the texel buffers that kernels read.
 const TEXEL_BYTES: u64 = 16;
