@@ -984,6 +984,19 @@ fn directories_are_compared_file_by_file() {
     let failed = run(folder, &[&line[..], &["--tolerance", "1deg"]].concat());
     let expected = "they differ: 1 pair over the limit, 2 files in only one of the directories";
     assert!(failed.words.contains(expected), "{}", failed.words);
+    // A result that is cut to half of its length is no equal.
+    write("short/same.dat", "# 1 1\n0 1 0 0 0\n2 1 0 0 0\n");
+    write("whole/same.dat", "# 1 1\n0 1 0 0 0\n4 1 0 0 0\n");
+    let (code, found) = json(
+        folder,
+        &["compare", "short", "whole", "--json", "--tolerance", "1deg"],
+    );
+    assert_eq!(
+        (code, &found["pairs"][0]["unshared_seconds"]),
+        (8, &Value::from(2.0))
+    );
+    let report = String::from_utf8(succeed(folder, &["compare", "short", "whole"]).out).unwrap();
+    assert!(report.contains("same.dat: 2 s in only one\n"), "{report}");
     write("after/deep/turn.dat", "# 1 1\n0 1 0\n");
     let failed = run(folder, &line);
     assert_eq!(failed.code, 3, "{}", failed.words);

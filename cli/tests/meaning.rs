@@ -498,10 +498,36 @@ fn coarse_steps_of_angles_are_said() {
     let made = line(folder, "convert long.csv --robot cart.urdf -o long.npz");
     says(
         &made,
-        "warning[W918]: `wheel` reaches 10000 rad: keys are f32, whose steps are 9.8e-4 rad there; shorter files have finer steps",
+        "warning[W918]: `wheel` reaches 5001 rad on each side of its middle: keys are f32, whose steps are 4.9e-4 rad there; shorter \
+         files have finer steps",
     );
     let made = line(folder, "convert short.csv --robot cart.urdf -o short.npz");
     assert!(!made.words.contains("W918"), "{}", made.words);
+}
+
+/// A wheel that turns by more than half a turn between two keys: its angles count turns, so that none was wrapped.
+#[test]
+fn angles_that_count_turns_are_not_unwrapped() {
+    let temporary = tempfile::tempdir().unwrap();
+    let folder = temporary.path();
+    let robot = r#"<robot name="cart"><link name="base"/><link name="rim"/><joint name="wheel" type="continuous">
+      <parent link="base"/><child link="rim"/><axis xyz="0 1 0"/></joint></robot>"#;
+    fs::write(folder.join("cart.urdf"), robot).unwrap();
+    for step in [4.0, -33.0] {
+        let mut text = "t,wheel.scalar_angle\n".to_owned();
+        for key in 0..=100 {
+            let _ = writeln!(text, "{},{}", f64::from(key) / 10.0, step * f64::from(key));
+        }
+        fs::write(folder.join("wheel.csv"), text).unwrap();
+        line(
+            folder,
+            "eval wheel.csv --robot cart.urdf --quantity scalars -o out.csv --overwrite",
+        );
+        let found = fs::read_to_string(folder.join("out.csv")).unwrap();
+        let last = found.trim_end().rsplit([',', '\n']).next().unwrap();
+        let last: f64 = last.parse().unwrap();
+        assert!((last - 100.0 * step).abs() < 1e-3, "{found}");
+    }
 }
 
 /// The states of a data set are the robot's joints, and its actions are left out, which is said.

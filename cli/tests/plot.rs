@@ -792,11 +792,14 @@ fn a_report_has_all_animations() {
         animation("Run")
     );
     fs::write(folder.join("hero.gltf"), text).unwrap();
-    succeed(
+    fs::write(folder.join("joint.csv"), "t,arm.scalar_angle\n0,0\n1,1\n").unwrap();
+    // A clip without tracks is refused, and the report has the others.
+    let made = run(
         folder,
         &[
             "plot",
             "--report",
+            "joint.csv",
             "hero.gltf",
             "-m",
             "slerp",
@@ -804,6 +807,9 @@ fn a_report_has_all_animations() {
             "report",
         ],
     );
+    assert_eq!(made.code, 3, "{}", made.words);
+    let refusal = "joint.csv: has no tracks of rotations, only 1 scalar";
+    assert!(made.words.contains(refusal), "{}", made.words);
     let page = fs::read_to_string(folder.join("report/index.html")).unwrap();
     for name in ["Walk", "Run"] {
         assert!(

@@ -23,6 +23,7 @@ pub static FORMAT: Format = Format {
     summary: "a trajectory, CSV of nanoseconds, `x y z` and `qw qx qy qz`",
     extensions: &[],
     probe: |start| {
+        let start = start.strip_prefix(b"\xef\xbb\xbf").unwrap_or(start);
         let line = start
             .split(|&byte| byte == b'\n')
             .next()

@@ -464,6 +464,36 @@ fn names_of_joints_are_never_lost_silently() {
         "{refused}"
     );
 
+    // `numpy.str_`, as `numpy.array(list(names), dtype=object)` of an array of texts has them.
+    let numpy_text = |text: &str| {
+        let words: String = text
+            .chars()
+            .map(|c| format!("{c}\\x00\\x00\\x00"))
+            .collect();
+        let (length, bytes) = (text.len(), 4 * text.len());
+        format!(
+            "cnumpy.core.multiarray\nscalar\n(cnumpy\ndtype\n(S'U{length}'\nI0\nI1\ntR(I3\nS'<'\nNNNI{bytes}\nI4\nI8\ntb\
+             S'{words}'\ntR"
+        )
+    };
+    let items = format!("({}{}l", numpy_text("knee"), numpy_text("hip"));
+    let loaded = file(objects("(2,)", &items), None).unwrap();
+    let set = &loaded.clips[0].set;
+    assert_eq!(
+        (set.scalar_named("knee"), set.scalar_named("hip")),
+        (Some(0), Some(1))
+    );
+    assert!(loaded.warnings.is_empty(), "{:?}", loaded.warnings);
+
+    let refused = file(objects("(2,)", "(S'knee'\nNl"), None).unwrap_err();
+    assert_eq!(refused.code, Code::ElementType);
+    assert!(
+        refused
+            .message
+            .contains("`dof_names` has values that are no text"),
+        "{refused}"
+    );
+
     let damaged = floats("(-5, 2)", &[0.0; 4]);
     let loaded = file(names(), Some(("joint_vel", damaged.clone()))).unwrap();
     let warning = loaded.warnings[0].to_string();

@@ -60,7 +60,7 @@ impl ScalarKind {
 }
 
 /// Angles from this magnitude on, in radians, are stored in steps of 6e-5 rad or more.
-const COARSE: f32 = 512.0;
+pub(crate) const COARSE_ANGLE: f32 = 512.0;
 
 impl Scalar {
     /// A scalar of a kind; contacts are steps.
@@ -145,7 +145,8 @@ impl Motion {
             let magnitudes = keys.keys.iter().map(|key| key.abs());
             (magnitudes.fold(0.0, f32::max), index, keys.name)
         });
-        let all: Vec<(f32, usize, &str)> = largest.filter(|angle| angle.0 >= COARSE).collect();
+        let all: Vec<(f32, usize, &str)> =
+            largest.filter(|angle| angle.0 >= COARSE_ANGLE).collect();
         let (largest, index, name) = all.iter().copied().max_by(|a, b| a.0.total_cmp(&b.0))?;
         let side = match self.scalar(index).origin {
             0.0 => "",

@@ -285,7 +285,20 @@ impl Archive {
     /// When it holds anything else: names that cannot be read are not passed over.
     pub(crate) fn texts(&self, name: &str) -> Result<Option<Vec<String>>, Diagnostic> {
         let Some(member) = self.find(name) else {
-            return Ok(None);
+            // A pickled list of other values has a member for each.
+            let is_part = |member: &&Member| {
+                let rest = member.name.strip_prefix(name);
+                member.is_array && rest.is_some_and(|rest| rest.starts_with('.'))
+            };
+            return match self.members.iter().position(|member| is_part(&member)) {
+                Some(part) => {
+                    let message = format!(
+                        "`{name}` has values that are no text; save its texts as such (dtype=str), or leave it out"
+                    );
+                    Err(self.refuse(part, Code::ElementType, message))
+                }
+                None => Ok(None),
+            };
         };
         let texts = self.array(member)?.texts();
         texts.map(Some).map_err(|why| {

@@ -239,14 +239,23 @@ impl<'a> Values<'a> {
     fn texts(&mut self, visit: &Visit, items: &[NodeId]) -> Result<bool, Diagnostic> {
         let nodes = &self.tree.nodes;
         let value = |node: NodeId| resolve(nodes, node).map(|node| &nodes[node.index()]);
-        let is_text = |&item| matches!(value(item), Some(Node::Text(_) | Node::Bytes(_)));
+        let one = |&item: &NodeId| match value(item)? {
+            Node::Array(array) => single_text(array, self.input).map(Cow::Owned),
+            other => text(other, self.input),
+        };
+        let is_text = |item: &NodeId| {
+            matches!(
+                value(*item),
+                Some(Node::Text(_) | Node::Bytes(_) | Node::Array(_))
+            )
+        };
         if items.is_empty() || !items.iter().all(is_text) {
             return Ok(false);
         }
-        let texts = items
-            .iter()
-            .filter_map(|&item| text(value(item)?, self.input));
-        let texts: Vec<Cow<'_, str>> = texts.collect();
+        let texts: Vec<Cow<'_, str>> = items.iter().filter_map(one).collect();
+        if texts.len() < items.len() {
+            return Ok(false);
+        }
         let lengths = texts.iter().map(|text| text.chars().count());
         let longest = lengths.max().unwrap_or(0);
         self.take(items.len(), longest.saturating_mul(8))?;
@@ -370,6 +379,15 @@ fn single_number(array: &Array, input: &[u8]) -> Option<f64> {
         bytes: array.data.bytes(input).into(),
     };
     array.numbers()?.first().copied()
+}
+
+/// The text of an array without axes, such as `numpy.str_`.
+fn single_text(array: &Array, input: &[u8]) -> Option<String> {
+    let array = crate::npz::array::Array {
+        header: Some(&array.header).filter(|header| header.shape.is_empty())?,
+        bytes: array.data.bytes(input).into(),
+    };
+    array.texts().ok()?.pop()
 }
 
 /// The characters of a text in four bytes each, at least as many as `least`.

@@ -11,6 +11,7 @@ use tumble::{Channel, ScalarKeys, TrackError, TrackSet};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::dialect::write::WrittenDialect;
 use crate::format::{Adjustment, Loaded};
+use crate::motion::scalars::COARSE_ANGLE;
 use crate::motion::{Motion, RecordedBodies, Scalar, ScalarKind, carry_key_data};
 use crate::printable::printable;
 use crate::quaternion::ComponentOrder;
@@ -286,15 +287,16 @@ fn valued_scalars<'a>(
     valued
 }
 
-/// The whole turns nearest to the middle of some angles, if without them the largest angle is less than half as large:
-/// angles near 0 keep the digits of the file.
+/// The whole turns nearest to the middle of some angles, if without them the largest angle is less than half as large, or
+/// smaller and otherwise in coarse steps: angles near 0 keep the digits of the file.
 fn whole_circles(angles: &[f64]) -> Option<f64> {
     let [low, high] = [f64::min, f64::max].map(|pick| angles.iter().copied().reduce(pick));
     let (low, high) = (low?, high?);
     let circles = (f64::midpoint(low, high) / TAU).round() * TAU;
     let [before, after] =
         [0.0, circles].map(|circles| (low - circles).abs().max((high - circles).abs()));
-    (2.0 * after < before).then_some(circles)
+    let is_coarse = before >= f64::from(COARSE_ANGLE);
+    (2.0 * after < before || (is_coarse && after < before)).then_some(circles)
 }
 
 /// The tracks that move joints, with the names of these.

@@ -186,12 +186,17 @@ pub fn unwrap_angles(angles: &mut [f64], period: f64) {
     }
 }
 
-/// Unwraps the angles of a joint if it is a hinge without limits: then a file may have wrapped them.
+/// Unwraps the angles of a joint if it is a hinge without limits, and all angles are within one turn: then a file may have
+/// wrapped them. Angles in a wider range count turns already.
 pub fn unwrap_joint(tree: &Tree, joint: &str, values: &mut [f64]) {
     let is_endless = tree.scalar_joints().any(|known| {
         known.name == joint && known.kind == JointKind::Hinge && known.limits.is_none()
     });
-    if is_endless {
+    /// More than the rounding of a turn to f32.
+    const ROUNDING: f64 = 1e-5;
+    let [low, high] = [f64::min, f64::max].map(|pick| values.iter().copied().reduce(pick));
+    let may_be_wrapped = (low.zip(high)).is_some_and(|(low, high)| high - low <= TAU + ROUNDING);
+    if is_endless && may_be_wrapped {
         unwrap_angles(values, TAU);
     }
 }

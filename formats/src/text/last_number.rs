@@ -32,8 +32,21 @@ impl LastNumbers {
         let (start, decimals) = last_number(line)?;
         let all = &self.decimals[..self.count.min(LINES)];
         let is_shorter = all.len() >= LEAST && all.iter().all(|&other| decimals < other);
-        is_shorter.then_some(start as u64 + 1)
+        // A rotation such as `0 0 0 1` is short throughout; where a number is cut, those before it are whole.
+        let is_short = |end: usize| {
+            let before = last_number(without_separators(&line[..end]))?;
+            (before.1 <= decimals).then_some(before.0)
+        };
+        let are_all_short = is_short(start).and_then(is_short).is_some();
+        (is_shorter && !are_all_short).then_some(start as u64 + 1)
     }
+}
+
+fn without_separators(mut line: &[u8]) -> &[u8] {
+    while let [rest @ .., b' ' | b'\t' | b',' | b';'] = line {
+        line = rest;
+    }
+    line
 }
 
 /// Where the last number of some text is, if it may be cut: its line from 1, and its column.
@@ -47,7 +60,7 @@ pub(crate) fn cut(text: &[u8]) -> Option<(u64, u64)> {
     Some((above as u64 + 1, column))
 }
 
-/// Where the number at the end of a line begins, and how many decimals it has.
+/// Where the number at the end of a line begins, and how many digits it has after the point, those of an exponent included.
 fn last_number(line: &[u8]) -> Option<(usize, usize)> {
     let line = line.strip_suffix(b"\r").unwrap_or(line);
     let is_comment = line.trim_ascii_start().starts_with(b"#");
@@ -59,7 +72,7 @@ fn last_number(line: &[u8]) -> Option<(usize, usize)> {
     let is_number =
         !is_comment && number.iter().all(is_part) && number.iter().any(u8::is_ascii_digit);
     let after_point = number.iter().skip_while(|&&byte| byte != b'.').skip(1);
-    let decimals = after_point.take_while(|byte| byte.is_ascii_digit()).count();
+    let decimals = after_point.filter(|byte| byte.is_ascii_digit()).count();
     is_number.then_some((start, decimals))
 }
 
@@ -73,9 +86,14 @@ mod tests {
         assert_eq!(cut(whole.as_bytes()), None);
         assert_eq!(cut(&whole.as_bytes()[..whole.len() - 2]), Some((4, 3)));
         assert_eq!(cut(&whole.as_bytes()[..whole.len() - 5]), Some((4, 3)));
+        let exponents =
+            "1.5e+00 1.631700e+01\n1.6e+00 1.641700e+01\n1.7e+00 1.651700e+01\n1.8e+00 1.661700e+0";
+        assert_eq!(cut(exponents.as_bytes()), Some((4, 9)));
+        assert_eq!(cut(format!("{exponents}1").as_bytes()), None);
         for good in [
             "0,1.5\n1,2\n2,3\n3,4",
             "# 0.1\n1.5\n# 2",
+            "0 0.98 0.1 0.25\n1 0.97 0.2 0.75\n2 0.96 0.3 0.35\n3 0 0 1",
             "",
             "1.25\n1.5",
             "a 0.1\nb 0.2\nc 0.3\nd 1.\n",

@@ -36,6 +36,8 @@ struct LargestDifferences {
     number: f64,
     /// Tracks and scalars that only one of the files has.
     missing: usize,
+    /// Seconds that only one of the two has, and which are not compared.
+    unshared_seconds: f64,
 }
 
 /// The comparison of the files of one name.
@@ -101,13 +103,15 @@ pub(super) fn run(arguments: &Arguments, folders: [&Path; 2]) -> Result<(), Fail
         return Err(Failure::new(ALL_INPUTS, message));
     }
     let mut outcomes = Outcomes::of(pairs.len());
-    let mut over = 0;
+    let (mut over, mut partial) = (0, 0);
     for (file, paths) in pairs {
         let compared = arguments.compared(paths);
         let (pair, outcome) = match compared {
             Ok((found, rest)) => {
                 over += usize::from(arguments.judge(&found).is_err());
-                (Ok(LargestDifferences::of(&found)), rest)
+                let largest = LargestDifferences::of(&found);
+                partial += usize::from(largest.unshared_seconds > 0.0);
+                (Ok(largest), rest)
             }
             Err(failure) => (Err(failure.message().to_owned()), Err(failure)),
         };
@@ -131,6 +135,12 @@ pub(super) fn run(arguments: &Arguments, folders: [&Path; 2]) -> Result<(), Fail
     let mut faults = Vec::new();
     if over > 0 {
         faults.push(format!("{} over the limit", words::count(over, "pair")));
+    }
+    if partial > 0 && has_bound {
+        faults.push(format!(
+            "{} of which one is longer than the other",
+            words::count(partial, "pair")
+        ));
     }
     if missing > 0 && has_bound {
         faults.push(words::count(missing, "file") + " in only one of the directories");
@@ -181,12 +191,19 @@ impl LargestDifferences {
             };
             *of_kind = of_kind.max(difference.spread.largest);
         }
+        self.unshared_seconds += clip.unshared_seconds;
         let missing = clip.missing.iter().chain(&clip.missing_scalars);
         self.missing += missing.map(Vec::len).sum::<usize>();
     }
 
     fn is_none(self) -> bool {
-        self.missing == 0 && [self.angle, self.distance, self.number] == [0.0; 3]
+        let numbers = [
+            self.angle,
+            self.distance,
+            self.number,
+            self.unshared_seconds,
+        ];
+        self.missing == 0 && numbers == [0.0; 4]
     }
 }
 
@@ -212,6 +229,10 @@ impl FolderDifference {
                     }
                     if found.missing > 0 {
                         parts.push(format!("{} tracks or scalars in only one", found.missing));
+                    }
+                    if found.unshared_seconds > 0.0 {
+                        let seconds = words::decimals(found.unshared_seconds);
+                        parts.push(format!("{seconds} s in only one"));
                     }
                     let _ = writeln!(text, "{name}: {}", parts.join(", "));
                 }

@@ -44,7 +44,8 @@ compared as by the program evo, after the alignment by --align, at the times of 
 poses. The other is interpolated there by lines and arcs; --associate nearest:0.01 takes its nearest \
 pose within 0.01 s instead, as evo does. --tolerance and --distance are then limits of the absolute errors.
 Of two directories, the files with the same relative names are compared: a line for each pair that differs, and a \
-summary. With --tolerance or --distance the exit code is 8 if a pair exceeds it, or if a file is in only one.
+summary. With --tolerance or --distance the exit code is 8 if a pair exceeds it, if one of a pair is longer, or if a file is \
+in only one.
 
 Examples:
   tumble compare walk.bvh walk.glb

@@ -16,6 +16,7 @@ use crate::commands::plot::source::curves::{NAMES, PlotSubject, box_name};
 use crate::commands::plot::source::{PlotSamples, PlotSource};
 use crate::commands::plot::subjects::{PANELS, moving_boxes};
 use crate::commands::plot::{Arguments, FigureWriter, note_curves};
+use crate::messages::drawn::check_has_tracks;
 use crate::messages::exit::Failure;
 use crate::messages::progress::Progress;
 use crate::messages::{names, words};
@@ -52,6 +53,7 @@ pub(crate) fn write(
         let files = clip_file_names(&loaded.clips);
         for (clip, file) in loaded.clips.iter().zip(files) {
             let name = names::input(path);
+            check_has_tracks(&name, clip, "--show scalars draws them, without --report")?;
             let choices = arguments.choices(&name, clip)?;
             note_curves(&name, clip, &choices);
             let mut boxes = moving_boxes(&clip.set, &name);

@@ -65,6 +65,8 @@ pub struct ClipDifference {
     pub samples: usize,
     /// First and last sample time, in seconds, on the clock of the first clip.
     pub span: [f64; 2],
+    /// Seconds that only one of the clips has, and which are not compared.
+    pub unshared_seconds: f64,
     /// Number of rotations whose bits are equal, up to the sign of the quaternion.
     pub identical: u64,
     /// Angles between the rotations, in degrees.
@@ -163,16 +165,30 @@ impl ChannelTallies {
 }
 
 impl ClipPair<'_> {
+    /// The first and the last time of each clip, on the clock of the first.
+    fn spans(&self) -> [[f64; 2]; 2] {
+        let shifts = [0.0, self.shift()];
+        [0, 1].map(|side| {
+            let (first, last) = self.clips[side].set.time_span().unwrap_or((0.0, 0.0));
+            [first - shifts[side], last - shifts[side]]
+        })
+    }
+
+    /// Seconds that only one of the clips has.
+    fn unshared_seconds(&self) -> f64 {
+        let [first, second] = self.spans();
+        let shared = (first[1].min(second[1]) - first[0].max(second[0])).max(0.0);
+        let all = first[1] - first[0] + second[1] - second[0];
+        let unshared = all - 2.0 * shared;
+        if unshared > SAME_END { unshared } else { 0.0 }
+    }
+
     /// The times that lie in both clips.
     ///
     /// # Errors
     /// When the time spans of the clips do not overlap.
     pub fn common_times(&self) -> Result<CommonTimes, CompareError> {
-        let shifts = [0.0, self.shift()];
-        let spans = [0, 1].map(|side| {
-            let (first, last) = self.clips[side].set.time_span().unwrap_or((0.0, 0.0));
-            [first - shifts[side], last - shifts[side]]
-        });
+        let spans = self.spans();
         let clock = self.clips[0].time_offset as f64;
         let on_clock = |span: [f64; 2]| span.map(|time| time + clock);
         let start = spans[0][0].max(spans[1][0]);
@@ -440,6 +456,7 @@ impl ClipPair<'_> {
             tracks: pairs.len(),
             missing,
             samples: times.len(),
+            unshared_seconds: self.unshared_seconds(),
             span: [times.first(), times.last()].map(|time| time.copied().unwrap_or(0.0) + clock),
             identical,
             rotation: of_all(&angles, degrees),
