@@ -23,7 +23,8 @@ fn the_table_of_formats_is_that_of_the_code() {
         ) {
             (None, false, _) => "no",
             (Some(_), false, _) => "results",
-            (Some(_), true, _) => "results, clips",
+            (Some(_), true, true) => "results, clips",
+            (Some(_), true, false) => "results, one clip",
             (None, true, true) => "clips",
             (None, true, false) => "one clip",
         };
