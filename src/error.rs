@@ -62,9 +62,9 @@ pub enum Error {
     /// The output of an encoded result is not exactly as long as the result.
     #[error("the output has {length} bytes; the result has {needed}")]
     OutputBytes {
-        /// The length of the output, bytes.
+        /// The length of the output in bytes.
         length: usize,
-        /// The length of the result, bytes.
+        /// The length of the result in bytes.
         needed: usize,
     },
     /// The requested tracks or samples are out of range.

@@ -282,19 +282,19 @@ enum TumbleQuantity
    */
   TUMBLE_QUANTITY_ROTATION = 0,
   /*
-   The angular velocity in the axes of the rotating body, rad/s: `x y z 0`.
+   The angular velocity in the axes of the rotating body in rad/s: `x y z 0`.
    */
   TUMBLE_QUANTITY_VELOCITY_IN_BODY = 1,
   /*
-   The angular velocity in the axes of the parent, rad/s: `x y z 0`.
+   The angular velocity in the axes of the parent in rad/s: `x y z 0`.
    */
   TUMBLE_QUANTITY_VELOCITY_IN_PARENT = 2,
   /*
-   The angular acceleration in the axes of the rotating body, rad/s²: `x y z 0`.
+   The angular acceleration in the axes of the rotating body in rad/s²: `x y z 0`.
    */
   TUMBLE_QUANTITY_ACCELERATION_IN_BODY = 3,
   /*
-   The angular acceleration in the axes of the parent, rad/s²: `x y z 0`.
+   The angular acceleration in the axes of the parent in rad/s²: `x y z 0`.
    */
   TUMBLE_QUANTITY_ACCELERATION_IN_PARENT = 4,
 };
@@ -532,7 +532,7 @@ typedef struct TumbleEngineOptions {
    */
   size_t size;
   /*
-   The limit of memory, bytes: on a Vulkan device for everything except results, on the CPU for the segments of a
+   The limit of memory in bytes: on a Vulkan device for everything except results, on the CPU for the segments of a
    set. Larger sets are prepared piece by piece. 0: no limit.
    */
   uint64_t memory;
@@ -573,19 +573,19 @@ typedef struct TumbleSamples {
    */
   uint64_t rate_frames;
   /*
-   The denominator of the frame rate, seconds; 0 means 1.
+   The denominator of the frame rate: a number of seconds; 0 means 1.
    */
   uint64_t rate_seconds;
   /*
-   The time of the first frame, seconds, for `TUMBLE_SAMPLING_RANGE`.
+   The time of the first frame in seconds, for `TUMBLE_SAMPLING_RANGE`.
    */
   double start;
   /*
-   The time after which there are no frames, seconds, for `TUMBLE_SAMPLING_RANGE`; not before `start`.
+   The time in seconds after which there are no frames, for `TUMBLE_SAMPLING_RANGE`; not before `start`.
    */
   double end;
   /*
-   The sample times, seconds, for `TUMBLE_SAMPLING_TIMES` and `TUMBLE_SAMPLING_TIMES_OF_TRACKS`. They are copied
+   The sample times in seconds, for `TUMBLE_SAMPLING_TIMES` and `TUMBLE_SAMPLING_TIMES_OF_TRACKS`. They are copied
    during the call.
    */
   const double *times;
@@ -715,11 +715,11 @@ typedef struct TumbleBufferRange {
    */
   uint64_t buffer;
   /*
-   The start of the range, bytes.
+   The start of the range in bytes.
    */
   uint64_t offset;
   /*
-   The length of the range, bytes.
+   The length of the range in bytes.
    */
   uint64_t size;
 } TumbleBufferRange;
@@ -888,7 +888,7 @@ typedef struct TumbleCrowdLayer {
    */
   size_t clip;
   /*
-   The layer's current time in the clip, ticks. Outside the clip `wrap` applies.
+   The layer's current time in ticks of the clip. Outside the clip `wrap` applies.
    */
   int64_t time;
   /*
@@ -934,11 +934,11 @@ typedef struct TumbleCrowdFade {
    */
   size_t layer;
   /*
-   The clock's time at which the fade starts, ticks; in the past or in the future.
+   The clock's time in ticks at which the fade starts; in the past or in the future.
    */
   uint64_t start;
   /*
-   The duration of the fade, ticks; with 0 the weight changes at once.
+   The duration of the fade in ticks; with 0 the weight changes at once.
    */
   uint64_t ticks;
   /*
@@ -1103,7 +1103,7 @@ TumbleResult tumble_set_track_name(const struct TumbleSet *set,
                                    size_t *length);
 
 /*
- Returns the first and the last key time of all tracks, seconds; key times of translations and scales count too.
+ Returns the first and the last key time of all tracks in seconds; key times of translations and scales count too.
 
  # Errors
  `TUMBLE_RESULT_OUT_OF_RANGE` if the set has no tracks.
@@ -1389,8 +1389,8 @@ TumbleResult tumble_sampler_copy(const struct TumbleSampler *sampler,
                                  struct TumbleSampler **copy);
 
 /*
- Evaluates one track at a time, seconds. `value` receives four floats, according to the quantity of the clip's
- interpolation. Nothing is allocated.
+ Evaluates one track at `time`, which is in seconds. `value` receives four floats, according to the quantity of the
+ clip's interpolation. Nothing is allocated.
 
  # Errors
  `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such track; `TUMBLE_RESULT_INVALID_INPUT` if the time is not finite.
@@ -1404,8 +1404,8 @@ TumbleResult tumble_sampler_sample(const struct TumbleSampler *sampler,
                                    float *value);
 
 /*
- Evaluates every track at a time, seconds, into the caller's memory: four floats for each track. `output_count` is the
- number of floats. Nothing is allocated.
+ Evaluates every track at `time`, which is in seconds, into the caller's memory: four floats for each track.
+ `output_count` is the number of floats. Nothing is allocated.
 
  # Errors
  `TUMBLE_RESULT_WRONG_SIZE` if `output_count` is not 4 × tracks; `TUMBLE_RESULT_INVALID_INPUT` if the time is not
@@ -1420,8 +1420,8 @@ TumbleResult tumble_sampler_pose(const struct TumbleSampler *sampler,
                                  size_t output_count);
 
 /*
- Evaluates some tracks at a time, seconds, into the caller's memory: four floats for each of the `track_count` indices
- in `tracks`. `output_count` is the number of floats. Nothing is allocated.
+ Evaluates some tracks at `time`, which is in seconds, into the caller's memory: four floats for each of the
+ `track_count` indices in `tracks`. `output_count` is the number of floats. Nothing is allocated.
 
  # Errors
  `TUMBLE_RESULT_WRONG_SIZE` if `output_count` is not 4 × `track_count`; `TUMBLE_RESULT_OUT_OF_RANGE` if there is no
@@ -2041,7 +2041,7 @@ TumbleResult tumble_crowd_advance(struct TumbleCrowd *crowd,
                                   double seconds);
 
 /*
- Sets the clock's time, ticks, forwards or backwards. All instances follow.
+ Sets the clock's time in ticks, forwards or backwards. All instances follow.
 
  # Errors
  `TUMBLE_RESULT_INVALID_ARGUMENT` if `ticks` is 2^52 or more.
@@ -2049,7 +2049,7 @@ TumbleResult tumble_crowd_advance(struct TumbleCrowd *crowd,
 TumbleResult tumble_crowd_set_clock(struct TumbleCrowd *crowd, uint64_t ticks);
 
 /*
- Returns the clock's time, ticks.
+ Returns the clock's time in ticks.
 
  # Safety
  `ticks` must point to memory for a number.

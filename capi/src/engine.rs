@@ -41,7 +41,7 @@ impl Object for TumbleEngine {
 pub struct TumbleEngineOptions {
     /// `sizeof(TumbleEngineOptions)`.
     pub size: usize,
-    /// The limit of memory, bytes: on a Vulkan device for everything except results, on the CPU for the segments of a
+    /// The limit of memory in bytes: on a Vulkan device for everything except results, on the CPU for the segments of a
     /// set. Larger sets are prepared piece by piece. 0: no limit.
     pub memory: u64,
     /// The number of worker threads of the CPU, up to 1024; ignored on a Vulkan device. 0: all engines share a pool

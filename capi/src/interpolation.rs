@@ -50,13 +50,13 @@ pub enum TumbleEnds {
 pub enum TumbleQuantity {
     /// The rotation relative to the parent, a unit quaternion `x y z w`.
     Rotation = 0,
-    /// The angular velocity in the axes of the rotating body, rad/s: `x y z 0`.
+    /// The angular velocity in the axes of the rotating body in rad/s: `x y z 0`.
     VelocityInBody = 1,
-    /// The angular velocity in the axes of the parent, rad/s: `x y z 0`.
+    /// The angular velocity in the axes of the parent in rad/s: `x y z 0`.
     VelocityInParent = 2,
-    /// The angular acceleration in the axes of the rotating body, rad/s²: `x y z 0`.
+    /// The angular acceleration in the axes of the rotating body in rad/s²: `x y z 0`.
     AccelerationInBody = 3,
-    /// The angular acceleration in the axes of the parent, rad/s²: `x y z 0`.
+    /// The angular acceleration in the axes of the parent in rad/s²: `x y z 0`.
     AccelerationInParent = 4,
 }
 

@@ -37,9 +37,9 @@ pub enum TumblePassOperation {
 pub struct TumbleBufferRange {
     /// The `VkBuffer`, as a number: `(uint64_t)buffer`.
     pub buffer: u64,
-    /// The start of the range, bytes.
+    /// The start of the range in bytes.
     pub offset: u64,
-    /// The length of the range, bytes.
+    /// The length of the range in bytes.
     pub size: u64,
 }
 

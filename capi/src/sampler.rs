@@ -73,8 +73,8 @@ pub unsafe extern "C" fn tumble_sampler_copy(
     })
 }
 
-/// Evaluates one track at a time, seconds. `value` receives four floats, according to the quantity of the clip's
-/// interpolation. Nothing is allocated.
+/// Evaluates one track at `time`, which is in seconds. `value` receives four floats, according to the quantity of the
+/// clip's interpolation. Nothing is allocated.
 ///
 /// # Errors
 /// `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such track; `TUMBLE_RESULT_INVALID_INPUT` if the time is not finite.
@@ -97,8 +97,8 @@ pub unsafe extern "C" fn tumble_sampler_sample(
     })
 }
 
-/// Evaluates every track at a time, seconds, into the caller's memory: four floats for each track. `output_count` is the
-/// number of floats. Nothing is allocated.
+/// Evaluates every track at `time`, which is in seconds, into the caller's memory: four floats for each track.
+/// `output_count` is the number of floats. Nothing is allocated.
 ///
 /// # Errors
 /// `TUMBLE_RESULT_WRONG_SIZE` if `output_count` is not 4 × tracks; `TUMBLE_RESULT_INVALID_INPUT` if the time is not
@@ -123,8 +123,8 @@ pub unsafe extern "C" fn tumble_sampler_pose(
     })
 }
 
-/// Evaluates some tracks at a time, seconds, into the caller's memory: four floats for each of the `track_count` indices
-/// in `tracks`. `output_count` is the number of floats. Nothing is allocated.
+/// Evaluates some tracks at `time`, which is in seconds, into the caller's memory: four floats for each of the
+/// `track_count` indices in `tracks`. `output_count` is the number of floats. Nothing is allocated.
 ///
 /// # Errors
 /// `TUMBLE_RESULT_WRONG_SIZE` if `output_count` is not 4 × `track_count`; `TUMBLE_RESULT_OUT_OF_RANGE` if there is no

@@ -231,7 +231,7 @@ pub unsafe extern "C" fn tumble_set_track_name(
     })
 }
 
-/// Returns the first and the last key time of all tracks, seconds; key times of translations and scales count too.
+/// Returns the first and the last key time of all tracks in seconds; key times of translations and scales count too.
 ///
 /// # Errors
 /// `TUMBLE_RESULT_OUT_OF_RANGE` if the set has no tracks.

@@ -108,7 +108,7 @@ pub(crate) struct ChannelDifference {
     largest: f64,
     /// The name of the track with the largest difference.
     track: String,
-    /// The time of the largest difference, seconds, on the clock of the first clip.
+    /// The time of the largest difference in seconds, on the clock of the first clip.
     time: f64,
     /// The frame of the largest difference, counted in the first clip from 0 at its first key; None if it has no rate.
     frame: Option<f64>,
@@ -233,7 +233,7 @@ pub(crate) struct ClipDifference {
     missing: (Vec<String>, Vec<String>),
     /// The number of samples of each track.
     samples: usize,
-    /// The first and the last time, seconds.
+    /// The first and the last time in seconds.
     span: (f64, f64),
     /// The number of rotations whose bits are the same.
     identical: u64,
@@ -341,7 +341,7 @@ pub(crate) struct PathErrors {
     outside: usize,
     /// The number of poses that are not compared because they are in gaps of the other clip.
     in_gaps: usize,
-    /// First and last time, seconds.
+    /// First and last time in seconds.
     span: (f64, f64),
     /// The scale of the alignment. The alignment scales the estimate, then rotates it, then translates it.
     scale: f64,

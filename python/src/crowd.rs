@@ -332,7 +332,7 @@ impl Crowd {
         Ok(array)
     }
 
-    /// The time in its clip that each instance plays in a layer, seconds: (instances,), float64.
+    /// The time in seconds of its clip that each instance plays in a layer: (instances,), float64.
     ///
     /// >>> import tumble
     /// >>> door = tumble.Clip([0.0, 2.0], [[[0, 0, 0, 1], [0, 0, 1, 0]]], parents=[None])

@@ -55,7 +55,7 @@ impl Reduction {
         self.keys[1]
     }
 
-    /// The times of the samples, seconds, (samples,).
+    /// The times of the samples in seconds, (samples,).
     #[getter]
     fn times<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         PyArray1::from_slice(py, &self.times)

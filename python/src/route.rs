@@ -605,7 +605,7 @@ impl Route {
 
 #[pymethods]
 impl Walk {
-    /// When it is at each point, seconds, (n,). Two with the same point are a wait between them.
+    /// When it is at each point in seconds, (n,). Two with the same point are a wait between them.
     #[getter]
     fn times<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         PyArray1::from_slice(py, &self.times)

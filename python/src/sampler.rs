@@ -116,7 +116,7 @@ impl Sampler {
         self.__copy__()
     }
 
-    /// The rotation of a track, by its index or name, at a time, seconds: float32, (4,), a unit quaternion.
+    /// The rotation of a track, by its index or name, at a time in seconds: float32, (4,), a unit quaternion.
     /// `order`: "xyzw" or "wxyz".
     ///
     /// >>> import tumble
@@ -142,7 +142,7 @@ impl Sampler {
         Ok(result)
     }
 
-    /// The rotations at a time, seconds: float32, (tracks, 4), unit quaternions.
+    /// The rotations at a time in seconds: float32, (tracks, 4), unit quaternions.
     ///
     /// `tracks`: a list of indices or names; all if it is left out. `out`: a C-contiguous array of that shape, which is
     /// filled and returned. `order`: "xyzw" or "wxyz".

@@ -163,7 +163,7 @@ impl CrowdLibrary {
         self.masks.len() / self.joint_count() - 1
     }
 
-    /// The length of a clip, ticks: from its first key (of a rotation, translation or scale) to its last, and at
+    /// The length of a clip in ticks: from its first key (of a rotation, translation or scale) to its last, and at
     /// least 1. This is also the period of a loop. `None` if there is no such clip.
     #[must_use]
     pub fn ticks(&self, clip: usize) -> Option<u32> {

@@ -46,7 +46,7 @@ pub struct MotionStates<'a> {
     pub world_rotations: &'a mut [[f32; 4]],
     /// The velocity in the world: the derivative of the position.
     pub velocities: &'a mut [[f32; 3]],
-    /// The angular velocity about the world's axes, radians per second: the derivative of the world rotation.
+    /// The angular velocity about the world's axes in radians per second: the derivative of the world rotation.
     pub angular_velocities: &'a mut [[f32; 3]],
 }
 
@@ -343,7 +343,7 @@ impl MotionTables {
         self.ticks_per_second
     }
 
-    /// The length of a clip, ticks, at least 1; `None` if there is no such clip.
+    /// The length of a clip in ticks, at least 1; `None` if there is no such clip.
     #[must_use]
     pub fn ticks(&self, clip: usize) -> Option<u32> {
         self.clips.get(clip).map(|clip| clip.period)

@@ -35,9 +35,9 @@ pub enum Quantity {
     /// The rotation, a unit quaternion.
     #[default]
     Rotation,
-    /// The angular velocity, radians per second.
+    /// The angular velocity in radians per second.
     Velocity(Axes),
-    /// The angular acceleration, radians per second squared.
+    /// The angular acceleration in radians per second squared.
     Acceleration(Axes),
 }
 
@@ -199,10 +199,10 @@ names! {
     Frozen => "frozen",
 }
 
-/// The maximum half-angle between the last key of a loop and the first, radians.
+/// The maximum half-angle in radians between the last key of a loop and the first.
 const LOOP_TOLERANCE: f64 = 1e-3;
 
-/// The largest angular velocity at an end, radians per second.
+/// The largest angular velocity at an end in radians per second.
 const FASTEST: f64 = 1e12;
 
 impl Ends {

@@ -50,7 +50,7 @@ pub(crate) struct TimeBetweenKeys {
     pub(crate) key: usize,
     /// The weights of the keys at its start and its end, by [`KeptKeys::weights_at`].
     pub(crate) weights: [TangentWeights; 2],
-    /// Its end and the time, seconds.
+    /// Its end and the time in seconds.
     pub(crate) end: f64,
     pub(crate) time: f64,
     pub(crate) parameter: f32,

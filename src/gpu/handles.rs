@@ -237,9 +237,9 @@ impl VulkanQueue {
 pub struct VulkanBuffer {
     /// The buffer.
     pub buffer: vk::Buffer,
-    /// The start of the range, bytes: a multiple of the size of a stored value.
+    /// The start of the range in bytes: a multiple of the size of a stored value.
     pub offset: u64,
-    /// The length of the range, bytes: at least the size of the result.
+    /// The length of the range in bytes: at least the size of the result.
     pub size: u64,
 }
 
@@ -254,7 +254,7 @@ impl VulkanBuffer {
         }
     }
 
-    /// A range of the same size that starts at another offset, bytes.
+    /// A range of the same size that starts at another offset in bytes.
     #[must_use]
     pub fn at(self, offset: u64) -> Self {
         Self { offset, ..self }

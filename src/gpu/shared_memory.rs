@@ -10,9 +10,9 @@ use crate::machine::error::VulkanError;
 use crate::machine::error::calls::Named;
 use crate::threads::lock;
 
-/// The maximum size of a buffer in a shared allocation, bytes; larger buffers have separate allocations.
+/// The maximum size of a buffer in a shared allocation in bytes; larger buffers have separate allocations.
 const LARGEST: u64 = 512 << 10;
-/// The size of a shared allocation, bytes.
+/// The size of a shared allocation in bytes.
 const BLOCK: u64 = 4 << 20;
 
 /// The shared allocations (blocks) of a device.

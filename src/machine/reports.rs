@@ -21,15 +21,15 @@ pub struct DeviceInfo {
     pub uuid: String,
     /// The maximum number of bytes of one buffer that a kernel can access.
     pub max_storage_buffer_range: u64,
-    /// The maximum size of an allocation, bytes.
+    /// The maximum size of an allocation in bytes.
     pub max_memory_allocation_size: u64,
     /// The maximum number of invocations in one workgroup.
     pub max_compute_work_group_invocations: u32,
     /// The maximum number of workgroups of one dispatch, along each axis.
     pub max_compute_work_group_count: [u32; 3],
-    /// The alignment of offsets into storage buffers, bytes.
+    /// The alignment of offsets into storage buffers in bytes.
     pub min_storage_buffer_offset_alignment: u64,
-    /// The size of device-local memory, bytes.
+    /// The size of device-local memory in bytes.
     pub device_local_memory: u64,
     /// Whether signed zeros, infinities and NaN can be preserved (f32).
     pub preserves_signed_zero_inf_nan: bool,

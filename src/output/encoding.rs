@@ -26,7 +26,7 @@ pub(crate) struct Representation {
     components: &'static [&'static str],
     /// The indices of the components that are angles in degrees.
     angles: Range<usize>,
-    /// The maximum angle between a rotation and its decoded value, radians; `None` if rotations cannot be stored.
+    /// The maximum angle in radians between a rotation and its decoded value; `None` if rotations cannot be stored.
     pub(crate) error_bound: Option<f64>,
     /// Whether velocities and accelerations can be stored.
     pub(crate) takes_vectors: bool,
@@ -317,9 +317,9 @@ impl Default for EncodingOptions {
 pub struct EncodingLengthError {
     /// The number of rotations.
     pub rotations: usize,
-    /// The length of the memory, bytes.
+    /// The length of the memory in bytes.
     pub bytes: usize,
-    /// The required length, bytes.
+    /// The required length in bytes.
     pub needed: usize,
 }
 

@@ -76,7 +76,7 @@ pub enum ReduceError {
     Time {
         /// The time's index, from 0.
         index: usize,
-        /// The time, seconds.
+        /// The time in seconds.
         time: f64,
     },
     /// A sample is not finite, or is a rotation with norm 0.

@@ -62,7 +62,7 @@ impl SampleTimes {
         })
     }
 
-    /// The same rate from `from` to `to`, seconds. Explicit times cannot have a range; [`SampleTimes::resolve`]
+    /// The same rate from `from` to `to` in seconds. Explicit times cannot have a range; [`SampleTimes::resolve`]
     /// refuses it ([`SampleTimesError::TimesInRange`]).
     #[must_use]
     pub fn between(mut self, from: f64, to: f64) -> Self {
@@ -84,21 +84,21 @@ impl SampleTimes {
         self
     }
 
-    /// Explicit times, seconds, in any order, the same for every track.
+    /// Explicit times in seconds, in any order, the same for every track.
     #[must_use]
     #[doc(alias = "sample times")]
     pub fn at(times: Vec<f64>) -> Self {
         Self(SampleTimesKind::Shared(Arc::new(times)))
     }
 
-    /// Explicit times for each track, seconds: first all times of the first track, then those of the second, and so
+    /// Explicit times for each track in seconds: first all times of the first track, then those of the second, and so
     /// on. Each track has the same number of times.
     #[must_use]
     pub fn at_each(times: Vec<f64>) -> Self {
         Self(SampleTimesKind::PerTrack(Arc::new(times)))
     }
 
-    /// Computes the sample times for a set with `tracks` tracks, whose first and last key times are `span`, seconds.
+    /// Computes the sample times for a set with `tracks` tracks, whose first and last key times are `span` in seconds.
     ///
     /// # Errors
     /// When the sample times do not fit the set.
@@ -264,7 +264,7 @@ impl Timeline {
         })
     }
 
-    /// The time of a sample, seconds. `None` if the sample is out of range, or if times are listed for each track and
+    /// The time of a sample in seconds. `None` if the sample is out of range, or if times are listed for each track and
     /// the track is out of range.
     #[must_use]
     pub fn time(&self, track: usize, sample: usize) -> Option<f64> {
@@ -275,7 +275,7 @@ impl Timeline {
         (has_times && sample < self.count).then(|| self.time_at(track, sample))
     }
 
-    /// The times of all samples of a track, seconds. Empty if times are listed for each track and the track is out of
+    /// The times of all samples of a track in seconds. Empty if times are listed for each track and the track is out of
     /// range.
     #[must_use]
     pub fn times(&self, track: usize) -> impl ExactSizeIterator<Item = f64> {

@@ -98,7 +98,7 @@ fn room(engine: &VulkanEngine, bytes: u64) -> Result<Buffer, VulkanError> {
 }
 
 impl Resident<'_> {
-    /// The size of the result, bytes.
+    /// The size of the result in bytes.
     #[must_use]
     pub fn bytes(&self) -> u64 {
         self.bytes

@@ -18,9 +18,9 @@ pub struct TumbleCrowdFade {
     pub instance: usize,
     /// The index of the layer in the instance, from 1: layer 0 has no weight.
     pub layer: usize,
-    /// The clock's time at which the fade starts, ticks; in the past or in the future.
+    /// The clock's time in ticks at which the fade starts; in the past or in the future.
     pub start: u64,
-    /// The duration of the fade, ticks; with 0 the weight changes at once.
+    /// The duration of the fade in ticks; with 0 the weight changes at once.
     pub ticks: u64,
     /// The weight before the fade, 0 to 1, rounded to a multiple of 2^-15.
     pub from: f32,

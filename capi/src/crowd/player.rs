@@ -175,7 +175,7 @@ pub extern "C" fn tumble_crowd_advance(crowd: *mut TumbleCrowd, seconds: f64) ->
     code(|| Ok(handle::get(crowd)?.lock()?.inner.advance(seconds)?))
 }
 
-/// Sets the clock's time, ticks, forwards or backwards. All instances follow.
+/// Sets the clock's time in ticks, forwards or backwards. All instances follow.
 ///
 /// # Errors
 /// `TUMBLE_RESULT_INVALID_ARGUMENT` if `ticks` is 2^52 or more.
@@ -184,7 +184,7 @@ pub extern "C" fn tumble_crowd_set_clock(crowd: *mut TumbleCrowd, ticks: u64) ->
     code(|| Ok(handle::get(crowd)?.lock()?.inner.set_clock(ticks)?))
 }
 
-/// Returns the clock's time, ticks.
+/// Returns the clock's time in ticks.
 ///
 /// # Safety
 /// `ticks` must point to memory for a number.

@@ -180,7 +180,7 @@ struct ClipPart<'a> {
     clip: &'a Motion,
     /// Its first and its last key in its times.
     span: (f64, f64),
-    /// Its start in the joined clip, seconds.
+    /// Its start in the joined clip in seconds.
     start: f64,
     /// The rate of all keys.
     rate: Option<FrameRate>,

@@ -139,7 +139,7 @@ impl Engine {
     /// as_rotation=False, dtype="float32", device_array=False, …)`
     ///
     /// Which samples: `fps`, a rate (use "30000/1001", not 29.97), with `start` and
-    /// `end`, seconds, else from the first key to the last; or `at` (or `times`), seconds, in any
+    /// `end` in seconds, else from the first key to the last; or `at` (or `times`) in seconds, in any
     /// order: one list for all tracks, (tracks, frames), or a list with an array for each track. A
     /// single time gives a result without the axis of frames; lists of different lengths give a
     /// list of arrays.
@@ -194,10 +194,10 @@ impl Engine {
     /// `bodies(robot, joint_pos, root_pos=None, root_quat=None, *, order, source_fps=None, source_times=None,
     /// joint_names=None, body_order="depth-first", siblings="file", velocity_at="origin", …)`
     ///
-    /// `joint_pos`: (keys, joints), for `joint_names`, by default those of the robot. `root_pos`, `root_quat`: (keys, 3)
-    /// and (keys, 4), the pose of the free joint. Keys are at `source_fps`, or at `source_times`, seconds. `order`: "wxyz"
-    /// or "xyzw", of keys and results; it has no default, because files differ. `body_order`, `siblings` and
-    /// `velocity_at` are those of `Robot.forward`. Samples and `method` are those of `evaluate`.
+    /// `joint_pos`: (keys, joints), for `joint_names`, by default those of the robot. `root_pos`, `root_quat`: (keys,
+    /// 3) and (keys, 4), the pose of the free joint. Keys are at `source_fps`, or at `source_times` in seconds.
+    /// `order`: "wxyz" or "xyzw", of keys and results; it has no default, because files differ. `body_order`,
+    /// `siblings` and `velocity_at` are those of `Robot.forward`. Samples and `method` are those of `evaluate`.
     ///
     /// Joints are interpolated, and bodies follow from them. Velocities are derivatives of the curves. Angles of
     /// hinges without limits are unwrapped first. Joints without keys stay where the file has them, and joints that
@@ -274,7 +274,7 @@ impl Engine {
         )
     }
 
-    /// The angular velocity of every track at every sample: float32, (tracks, frames, 3), rad/s,
+    /// The angular velocity of every track at every sample: float32, (tracks, frames, 3) in rad/s,
     /// about the axes of the "body" or of its "parent", or in the "world": that of the rotation in the world,
     /// along the skeleton, about the world's axes. Of a track without a parent the last two are the same. Other
     /// keywords are those of `evaluate`.
@@ -300,7 +300,7 @@ impl Engine {
         self.result(clip, &result, out, options)
     }
 
-    /// The angular acceleration, rad/s²; otherwise as `velocity`.
+    /// The angular acceleration in rad/s²; otherwise as `velocity`.
     ///
     /// >>> import tumble
     /// >>> clip = tumble.Clip([0.0, 2.0], [[0, 0, 0, 1], [0, 0, 1, 0]])
@@ -691,7 +691,7 @@ impl Engine {
     /// up=(0, 1, 0), twist="spread", speed="keys", forward="z", upward="y", layout="track", order="xyzw")`
     ///
     /// `points`: (points, 3), (tracks, points, 3), or a list with an array for each track; `times`: seconds
-    /// of the points, or None with `duration`, seconds, or `rate`, the distance covered in a second. `ups`: upward
+    /// of the points, or None with `duration` in seconds, or `rate`, the distance covered in a second. `ups`: upward
     /// directions at the points, like them. `method`: the curve through the points. `ahead`: the body faces
     /// the point this far ahead instead of along the path; `look_at`: a point or a track's index that it
     /// faces. `frame`: how it is rotated about its direction, "minimal", "fixed" or "frenet", with `up` at the

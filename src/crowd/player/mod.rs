@@ -22,7 +22,7 @@ use crate::twin::crowd_entries::gather;
 use crate::twin::crowd_layers::Layers;
 use crate::twin::crowd_matrices::to_any_half;
 
-/// The clock's limit, ticks: below it, f64 represents all whole numbers.
+/// The clock's limit in ticks: below it, f64 represents all whole numbers.
 const FARTHEST: f64 = (1u64 << 52) as f64;
 
 /// Many instances of a library's skeleton, each of which plays clips at its time and speed.
@@ -426,13 +426,13 @@ impl Crowd {
         Ok(on_cpu::evaluate(scene, &*self.engine.machine, output)?)
     }
 
-    /// The clock's time, ticks.
+    /// The clock's time in ticks.
     #[must_use]
     pub fn clock(&self) -> u64 {
         self.instances.clock
     }
 
-    /// Sets the clock's time, ticks, forwards or backwards. All instances follow.
+    /// Sets the clock's time in ticks, forwards or backwards. All instances follow.
     ///
     /// # Errors
     /// When `ticks` is 2^52 or more, two centuries at 705 600 ticks a second.

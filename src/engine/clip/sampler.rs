@@ -279,7 +279,7 @@ impl Sampler {
         Ok(Quat::from_array(value))
     }
 
-    /// The value of every track at a time, seconds, into `output`, which has an element for each track.
+    /// The value of every track at a time in seconds, into `output`, which has an element for each track.
     ///
     /// # Errors
     /// When the time is not finite, `output` is not exactly as long as there are tracks, or its type does not fit the
@@ -289,7 +289,7 @@ impl Sampler {
         self.fill(None, time, bytemuck::cast_slice_mut(output))
     }
 
-    /// The values of some tracks at a time, seconds, into `output`, which has an element for each of `tracks`.
+    /// The values of some tracks at a time in seconds, into `output`, which has an element for each of `tracks`.
     ///
     /// # Errors
     /// As [`Sampler::pose`]; also when there is no such track. Then nothing is written.

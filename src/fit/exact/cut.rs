@@ -26,7 +26,7 @@ pub(crate) struct Subcurve {
     pub(crate) span: usize,
     /// The curve's index in [`Cutter::curves`].
     curve: usize,
-    /// The start and the length of its interval, seconds.
+    /// The start and the length of its interval in seconds.
     interval: (f64, f64),
     pub(crate) piece: CurvePiece,
     /// Its index among the segments, chosen when it is fitted; `None` after that if it is one of the finest pieces

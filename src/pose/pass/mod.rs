@@ -119,7 +119,7 @@ impl Engine {
 }
 
 impl<'a> PassRequest<'a> {
-    /// The length of each input, bytes.
+    /// The length of each input in bytes.
     #[must_use]
     pub fn input_bytes(&self) -> u64 {
         let (tracks, samples, _) = self.shape;
@@ -128,7 +128,7 @@ impl<'a> PassRequest<'a> {
             .saturating_mul(VALUE)
     }
 
-    /// The length of the result, bytes: that of an input, or twice as much for [`PosePass::World`], whose result is
+    /// The length of the result in bytes: that of an input, or twice as much for [`PosePass::World`], whose result is
     /// `[frame][track]`, a rotation `x y z w` and a position `x y z 0` each.
     #[must_use]
     pub fn bytes(&self) -> u64 {

@@ -25,7 +25,7 @@ pub struct ConfigurationRates {
     pub base: BodyVelocity,
     /// The velocity of each free joint, in the world's axes, or in those of the body's place in its parent.
     pub free: Vec<BodyVelocity>,
-    /// The angular velocity of each ball, in the body's axes, rad/s.
+    /// The angular velocity of each ball in the body's axes, in rad/s.
     pub balls: Vec<DVec3>,
     /// The velocity of each hinge (rad/s) and slide (m/s).
     pub scalars: Vec<f64>,
@@ -45,7 +45,7 @@ pub struct BodyPose {
 pub struct BodyVelocity {
     /// The velocity of its origin, m/s.
     pub linear: DVec3,
-    /// Its angular velocity, rad/s.
+    /// Its angular velocity in rad/s.
     pub angular: DVec3,
 }
 

@@ -20,7 +20,7 @@ pub struct Tcb {
 /// The largest magnitude of a tension, a continuity or a bias. With it, computations do not overflow.
 pub(crate) const LARGEST_TCB: f64 = 1e6;
 
-/// The largest angular velocity at a key, radians per second.
+/// The largest angular velocity at a key in radians per second.
 const FASTEST: f64 = 1e12;
 
 impl Tcb {
@@ -62,7 +62,7 @@ impl<T: Clone> KeyData<T> {
 }
 
 impl TrackSet {
-    /// Sets the angular velocity at each key of a track, radians per second in the body frame, for
+    /// Sets the angular velocity at each key of a track in radians per second in the body frame, for
     /// [`HERMITE`](crate::method::hermite::HERMITE).
     ///
     /// # Errors

@@ -88,7 +88,7 @@ impl TrackSet {
     /// Appends a track for a body that follows a path ([`Engine::follow`](crate::engine::Engine::follow)), and
     /// returns its index.
     ///
-    /// The points are translation keys at `times`, seconds, strictly increasing; the track has no rotation keys
+    /// The points are translation keys at `times` in seconds, strictly increasing; the track has no rotation keys
     /// except an identity. `ups` are upward directions at some points: it is empty, or has one entry for each point.
     ///
     /// # Errors
