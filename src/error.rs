@@ -22,7 +22,7 @@ use crate::tracks::per_track::PerTrackCountError;
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// The sample times do not fit the set.
+    /// The sample times do not fit the set ([`SampleTimes::resolve`](crate::SampleTimes::resolve)).
     #[error(transparent)]
     SampleTimes(#[from] SampleTimesError),
     /// A track cannot be interpolated as requested.

@@ -62,8 +62,9 @@ pub fn no_contraction(module: &[u32]) -> Result<Vec<u32>, PassError> {
     decorated(module, HalfFloats::Refused)
 }
 
-/// As [`no_contraction`], for a module that converts f32 to half precision. It gets the modes by which conversions round
-/// to nearest, ties to even, and keep subnormal numbers, so that only devices that report both may have it.
+/// As [`no_contraction`], for a module that converts f32 to half precision. The result requires modes by which
+/// conversions round to nearest, ties to even, and keep subnormal numbers, so only devices that report both modes can
+/// use the result.
 ///
 /// # Errors
 /// As for [`no_contraction`].

@@ -50,8 +50,9 @@ pub struct MotionStates<'a> {
     pub angular_velocities: &'a mut [[f32; 3]],
 }
 
-/// The clips of a [`CrowdLibrary`](crate::crowd::library::CrowdLibrary) as plain tables. The two large tables, spans
-/// and cells, are separate, so that several processes can map them from a file.
+/// The clips of a [`CrowdLibrary`](crate::crowd::library::CrowdLibrary) as plain tables. The two large tables are
+/// separate, so that several processes can map them from a file: spans (intervals in ticks) and cells (constants and
+/// keys).
 ///
 /// ```
 /// use tumble::glam::{Quat, Vec3};
@@ -255,7 +256,7 @@ impl MotionTables {
         }
         let span_count: usize = ranges.iter().map(|(_, spans, _)| spans.len()).sum();
         let cell_count: usize = ranges.iter().map(|(_, _, cells)| cells.len()).sum();
-        // Clips of a file that share their cells would take more memory than the file.
+        // Refuses clips that share cells: selecting them would need more memory than the file has bytes.
         if span_count > spans.len() || cell_count > cells.len() {
             return Err(CrowdError::BrokenTables);
         }
@@ -699,7 +700,8 @@ impl Poses<'_> {
                 parameter: 0.0,
             }));
         }
-        // The previous pose of a clip is often a frame away: of a window, or an end of a step.
+        // The previous pose was often of the same clip, about a frame earlier or later (in a window, or at the other
+        // end of a step), so the search starts at its positions.
         for (base, position) in bases.iter().zip(&mut *positions) {
             let guess = position.span & TICKS;
             *position = guessed_position(base, spans, (tick, clip_entry.period), guess);

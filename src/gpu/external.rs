@@ -290,8 +290,8 @@ impl<'a> ImportedMemory<'a> {
             return None;
         }
         let first = NonNull::new(memory.as_ptr().wrapping_sub(start))?;
-        // SAFETY: pages that hold a byte of the process's memory are its own as a whole, and
-        // this keeps the memory borrowed until nothing works on it any more.
+        // SAFETY: a page that has a byte of this process's memory belongs wholly to the process, and the returned value
+        // borrows the memory until the device has finished with it.
         let buffer = unsafe { Buffer::around(device, first, pages as u64) }?;
         Some(Self {
             buffer,

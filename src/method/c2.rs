@@ -108,7 +108,7 @@ fn velocities(
         let (first_solved, solved) = solve(track, signs, from..to, interpolation);
         keys.map(move |key| solved[(key as isize - first_solved) as usize].to_array())
     };
-    // If the work was stopped, the caller finds this out itself.
+    // If the work was stopped, the caller notices it after this function has returned.
     let windows = windows.take_while(|_| !stop::is_stopped());
     windows.flat_map(in_window).collect()
 }

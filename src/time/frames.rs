@@ -98,10 +98,18 @@ impl SampleTimes {
         Self(SampleTimesKind::PerTrack(Arc::new(times)))
     }
 
-    /// Computes the sample times for a set with `tracks` tracks, whose first and last key times are `span` in seconds.
+    /// Computes the sample times for a set with `tracks` tracks. `span` is the times of its first and last key in
+    /// seconds.
     ///
     /// # Errors
-    /// When the sample times do not fit the set.
+    /// * [`SampleTimesError::Rate`] when the rate is 0.
+    /// * [`SampleTimesError::TimeNotFinite`] when a time is NaN or infinite.
+    /// * [`SampleTimesError::ReversedRange`] when the end is before the start.
+    /// * [`SampleTimesError::TimesInRange`] when [`SampleTimes::between`] was called for explicit times.
+    /// * [`SampleTimesError::Uneven`] when times are listed for each track ([`SampleTimes::at_each`]), and their number
+    ///   is not a multiple of the number of tracks.
+    /// * [`SampleTimesError::TooMany`] when there are more than 2^40 samples of a track, or more values than memory can
+    ///   address.
     pub fn resolve(
         &self,
         tracks: usize,

@@ -200,8 +200,8 @@ impl Spans {
         rate: f64,
     ) -> SampleTimesError {
         let (starts, keys) = (&self.starts, &self.keys);
-        // An interval may be divided into several spans, and only the first one starts at a key. For curves that do
-        // not pass through their keys this is not known, so each span counts as an interval.
+        // An interval may be divided into several spans, and only the first one starts at a key. For curves that do not
+        // pass through their keys, it is not known which spans start at a key, so each span counts as an interval.
         let meets_keys = keys[part.spans.clone()].iter().any(|&key| key != NONE);
         let is_at_key = |&span: &usize| {
             let stands = matches!(self.source(span), SpanSource::Constant(_));

@@ -58,7 +58,7 @@ impl Clip {
     /// and on devices that cannot allocate the result at once.
     ///
     /// # Errors
-    /// When the frames do not fit the clip, or the device fails.
+    /// When the sample times do not fit the clip, or the device fails.
     pub fn resident(
         &self,
         frames: &SampleTimes,

@@ -87,15 +87,15 @@ impl Crowd {
         unsafe { self.record_between(target, commands, CommandScopes::default()) }
     }
 
-    /// As [`Crowd::record`], with barriers for some users of the result's memory alone. Earlier evaluations of the crowd
-    /// are waited for in any case.
+    /// As [`Crowd::record`], but the barriers order the evaluation only with the commands that `scopes` names: compute
+    /// shaders, copies or the host. Earlier evaluations of the crowd are always waited for.
     ///
     /// # Errors
     /// As for [`Crowd::record`].
     ///
     /// # Safety
-    /// As for [`Crowd::record`]; and the application has its own barriers for other commands that use the result's
-    /// memory.
+    /// As for [`Crowd::record`]. In addition, the application must have its own barriers for all other commands that
+    /// use the result's memory.
     pub unsafe fn record_between(
         &mut self,
         target: &CrowdTarget,
