@@ -225,7 +225,7 @@ typedef uint32_t TumbleWrap;
 #endif // __cplusplus
 
 /*
- The boundary condition: the curve in the first and in the last segment, where a neighbouring key is missing.
+ The boundary condition: the curve in the first and in the last interval, where a neighbouring key is missing.
  */
 enum TumbleEnds
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -512,8 +512,8 @@ typedef struct TumblePassTarget TumblePassTarget;
 
 /*
  A sampler: it evaluates a clip at one time after another, on the calling thread, for programs that need a pose now.
- It is fastest if most times are near the one before. Threads may share a sampler, but wait for each other; give each
- its own (`tumble_sampler_copy`).
+ Sampling is fastest if most times are near the time before. Threads that share a sampler wait for each other; give
+ each thread its own (`tumble_sampler_copy`).
  */
 typedef struct TumbleSampler TumbleSampler;
 
@@ -646,8 +646,8 @@ typedef struct TumbleInterpolation {
    */
   double tension;
   /*
-   The continuity of "kochanek-bartels", likewise. With -1 the curve has a corner at a key, with 1 a corner to
-   the other side.
+   The continuity of "kochanek-bartels", likewise. With -1 the curve has a corner at a key; with 1 the corner
+   points the other way, because the curve swings out beyond the key before and after it.
    */
   double continuity;
   /*
@@ -750,9 +750,10 @@ typedef struct TumblePass {
    */
   size_t sample_count;
   /*
-   The inputs, as the operation says. Each range starts at a multiple of 256, the layers of a blend at multiples
-   of 16, and has at least 16 × `track_count` × `sample_count` bytes. Layers that are contiguous in one buffer,
-   from a multiple of 256 on, are read directly; others are first copied into one buffer.
+   The inputs, as the operation says. Each range has at least 16 × `track_count` × `sample_count` bytes. For
+   `TUMBLE_PASS_OPERATION_BLEND`, each range must start at a multiple of 16; for other operations, at a multiple of
+   256. Layers of a blend that follow each other in one buffer, the first at a multiple of 256, are read directly;
+   others are first copied into one buffer.
    */
   const struct TumbleBufferRange *inputs;
   /*
@@ -1295,9 +1296,10 @@ TumbleResult tumble_upload(const struct TumbleEngine *engine,
                            struct TumbleClip **clip);
 
 /*
- Returns the memory that a clip takes on the host for each key, bytes: 16 and more of a clip that keeps its keys,
- 64, or 144 to 208, and more of one that keeps segments. On the CPU, large clips whose samples can be computed from
- their keys keep these.
+ Returns the memory that a clip takes on the host for each key, in bytes: 16 or more if the clip keeps its keys; if
+ the clip keeps segments, 64 or more for arcs (slerp), and 144 to 208 or more for polynomials. On the CPU, a clip
+ whose segments would exceed the limit `memory` of `TumbleEngineOptions` keeps its keys instead, if samples can be
+ computed from them.
 
  # Safety
  `bytes` must point to memory for a number.
@@ -1370,7 +1372,8 @@ TumbleResult tumble_clip_free(struct TumbleClip *clip);
  The clip may be freed before the sampler. The caller frees the sampler with `tumble_sampler_free`.
 
  # Errors
- `TUMBLE_RESULT_OUT_OF_MEMORY` if the clip exceeds its engine's memory limit, so that its segments are not kept.
+ `TUMBLE_RESULT_OUT_OF_MEMORY` if the segments of the clip exceed its engine's memory limit, and samples cannot be
+ computed from its keys within the limit.
 
  # Safety
  `sampler` must point to memory for a handle.
@@ -1444,11 +1447,12 @@ TumbleResult tumble_sampler_pose_of(const struct TumbleSampler *sampler,
 TumbleResult tumble_sampler_free(struct TumbleSampler *sampler);
 
 /*
- Appends a scalar of `key_count` keys, at least one, to a set. A set may have scalars without tracks.
+ Appends a scalar to a set: a number that changes over time, such as the angle of a hinge or a weight, with
+ `key_count` keys, at least one. A set may have scalars without tracks.
 
- `name` is its name in UTF-8. `times` are the key times in seconds, strictly
- increasing, and `keys` a number for each. `tangents` are for the method "gltf-cubic" and may be null: two numbers
- for each time, the incoming tangent and the outgoing one, in units per second. Arrays and name are copied.
+ `name` is the scalar's name in UTF-8. `times` are the key times in seconds, strictly increasing, and `keys` a number
+ for each. `tangents` are for the method "gltf-cubic" and may be null: two numbers for each time, the incoming
+ tangent and the outgoing one, in units per second. Arrays and name are copied.
 
  # Errors
  `TUMBLE_RESULT_INVALID_INPUT` if there are no keys, the times are not finite and strictly increasing, or a number
@@ -1473,11 +1477,11 @@ size_t tumble_set_scalar_count(const struct TumbleSet *set);
 /*
  Evaluates the scalars of a set, or how fast they change, into the caller's memory, and waits for the result.
 
- `interpolation` may be null for the defaults. Scalars are interpolated as translations are by its method
- (docs/methods.md): by "slerp" along lines, by "bessel-overhauser" with continuous velocities. Its ends and wraps
- apply; its quantity does not. `quantity` is a `TumbleScalarQuantity`, `layout` a `TumbleLayout`. `output` receives a
- float for each sample of each scalar. `output_count` is the number of floats, exactly scalars × samples
- (`tumble_set_scalar_count`, `tumble_set_sample_count`).
+ `interpolation` may be null for the defaults. The method of `interpolation` determines how scalars are interpolated,
+ as it does for translations (docs/methods.md): "slerp" along lines, "bessel-overhauser" with continuous velocities.
+ The ends and wraps of `interpolation` apply; its quantity is ignored. `quantity` is a `TumbleScalarQuantity`,
+ `layout` a `TumbleLayout`. `output` receives a float for each sample of each scalar. `output_count` is the number of
+ floats, exactly scalars × samples (`tumble_set_scalar_count`, `tumble_set_sample_count`).
 
  # Errors
  `TUMBLE_RESULT_WRONG_SIZE` if `output_count` is another number; otherwise as `tumble_evaluate`. On an error nothing
@@ -1855,8 +1859,8 @@ TumbleResult tumble_crowd_library_set_inverse_bind(struct TumbleCrowdLibrary *li
                                                    size_t joint_count);
 
 /*
- Sets the reference pose of `clip`, from which its additive layers differ: the pose of the clip `from` at a tick.
- After the end of `from` it is its last pose.
+ Sets the reference pose of `clip`, from which its additive layers differ: the pose of the clip `from` at `tick`; for
+ ticks after the end of `from`, its last pose.
 
  # Errors
  `TUMBLE_RESULT_OUT_OF_RANGE` if one of the two clips does not exist.
@@ -1936,7 +1940,7 @@ TumbleResult tumble_crowd_library_of_file(const struct TumbleFile *file,
 
 /*
  Adds a clip of a file to a library. Tracks are matched to joints by name; the file may be another one than that of
- `tumble_crowd_library_of_file`. A joint has the same parent in the clip as in the library.
+ `tumble_crowd_library_of_file`. A joint must have the same parent in the clip as in the library.
 
  Joints that the clip does not have stay at rest. The clip must not have joints that the library does not have.
  `clip_of_file` is the index of the clip in the file, counted from 0. `interpolation` and `vectors` are as in

@@ -147,9 +147,10 @@ pub unsafe extern "C" fn tumble_upload(
     })
 }
 
-/// Returns the memory that a clip takes on the host for each key, bytes: 16 and more of a clip that keeps its keys,
-/// 64, or 144 to 208, and more of one that keeps segments. On the CPU, large clips whose samples can be computed from
-/// their keys keep these.
+/// Returns the memory that a clip takes on the host for each key, in bytes: 16 or more if the clip keeps its keys; if
+/// the clip keeps segments, 64 or more for arcs (slerp), and 144 to 208 or more for polynomials. On the CPU, a clip
+/// whose segments would exceed the limit `memory` of `TumbleEngineOptions` keeps its keys instead, if samples can be
+/// computed from them.
 ///
 /// # Safety
 /// `bytes` must point to memory for a number.

@@ -24,7 +24,7 @@ pub enum TumbleKeySigns {
     AsAuthored = 1,
 }
 
-/// The boundary condition: the curve in the first and in the last segment, where a neighbouring key is missing.
+/// The boundary condition: the curve in the first and in the last interval, where a neighbouring key is missing.
 #[repr(u32)]
 #[derive(Debug, Clone, Copy)]
 pub enum TumbleEnds {
@@ -113,8 +113,8 @@ pub struct TumbleInterpolation {
     /// The tension of "kochanek-bartels"; 0 is neutral, usual values are from -1 to 1. With 1 the velocity at a key
     /// is 0, with -1 it is doubled.
     pub tension: f64,
-    /// The continuity of "kochanek-bartels", likewise. With -1 the curve has a corner at a key, with 1 a corner to
-    /// the other side.
+    /// The continuity of "kochanek-bartels", likewise. With -1 the curve has a corner at a key; with 1 the corner
+    /// points the other way, because the curve swings out beyond the key before and after it.
     pub continuity: f64,
     /// The bias of "kochanek-bartels", likewise. With 1 the tangent at a key follows the interval before it, with -1
     /// the interval after it.

@@ -58,9 +58,10 @@ pub struct TumblePass {
     pub track_count: usize,
     /// The number of samples of each track.
     pub sample_count: usize,
-    /// The inputs, as the operation says. Each range starts at a multiple of 256, the layers of a blend at multiples
-    /// of 16, and has at least 16 × `track_count` × `sample_count` bytes. Layers that are contiguous in one buffer,
-    /// from a multiple of 256 on, are read directly; others are first copied into one buffer.
+    /// The inputs, as the operation says. Each range has at least 16 × `track_count` × `sample_count` bytes. For
+    /// `TUMBLE_PASS_OPERATION_BLEND`, each range must start at a multiple of 16; for other operations, at a multiple of
+    /// 256. Layers of a blend that follow each other in one buffer, the first at a multiple of 256, are read directly;
+    /// others are first copied into one buffer.
     pub inputs: *const TumbleBufferRange,
     /// The number of `inputs`.
     pub input_count: usize,

@@ -10,8 +10,8 @@ use crate::handle::{self, Object};
 use crate::result::{Failure, TumbleResult, code};
 
 /// A sampler: it evaluates a clip at one time after another, on the calling thread, for programs that need a pose now.
-/// It is fastest if most times are near the one before. Threads may share a sampler, but wait for each other; give each
-/// its own (`tumble_sampler_copy`).
+/// Sampling is fastest if most times are near the time before. Threads that share a sampler wait for each other; give
+/// each thread its own (`tumble_sampler_copy`).
 pub struct TumbleSampler {
     inner: Mutex<Sampler>,
 }
@@ -36,7 +36,8 @@ fn give(sampler: Sampler) -> *mut TumbleSampler {
 /// The clip may be freed before the sampler. The caller frees the sampler with `tumble_sampler_free`.
 ///
 /// # Errors
-/// `TUMBLE_RESULT_OUT_OF_MEMORY` if the clip exceeds its engine's memory limit, so that its segments are not kept.
+/// `TUMBLE_RESULT_OUT_OF_MEMORY` if the segments of the clip exceed its engine's memory limit, and samples cannot be
+/// computed from its keys within the limit.
 ///
 /// # Safety
 /// `sampler` must point to memory for a handle.

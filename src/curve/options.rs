@@ -161,7 +161,7 @@ impl KeySigns {
     }
 }
 
-/// The curve in the first and in the last segment, where a neighbouring key is missing. A track of only two keys is
+/// The curve in the first and in the last interval, where a neighbouring key is missing. A track of only two keys is
 /// interpolated by slerp for any ends.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[doc(alias = "boundary condition")]

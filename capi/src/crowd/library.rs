@@ -245,8 +245,8 @@ pub unsafe extern "C" fn tumble_crowd_library_set_inverse_bind(
     })
 }
 
-/// Sets the reference pose of `clip`, from which its additive layers differ: the pose of the clip `from` at a tick.
-/// After the end of `from` it is its last pose.
+/// Sets the reference pose of `clip`, from which its additive layers differ: the pose of the clip `from` at `tick`; for
+/// ticks after the end of `from`, its last pose.
 ///
 /// # Errors
 /// `TUMBLE_RESULT_OUT_OF_RANGE` if one of the two clips does not exist.

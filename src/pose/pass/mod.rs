@@ -21,9 +21,9 @@ use crate::pose::skeleton::Skeleton;
 ///
 /// Each input is a range of a buffer with four f32 for each rotation, as
 /// [`Request::to_buffer`](crate::engine::clip::request::Request::to_buffer) and
-/// [`ClipTarget::record`](crate::gpu::clip::ClipTarget::record) write it. Ranges start at multiples of 256
-/// bytes, layers of a blend at multiples of 16. Layers of a blend that are contiguous in one buffer, from a multiple
-/// of 256 bytes on, are read directly; others are copied into one buffer first.
+/// [`ClipTarget::record`](crate::gpu::clip::ClipTarget::record) write it. Layers of a blend must start at multiples of
+/// 16 bytes, all other ranges at multiples of 256. Layers of a blend that follow each other in one buffer, the first at
+/// a multiple of 256 bytes, are read directly; others are first copied into one buffer.
 #[derive(Debug, Clone, Copy)]
 #[non_exhaustive]
 pub enum PosePass<'a> {

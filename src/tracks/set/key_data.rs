@@ -11,7 +11,8 @@ use crate::tracks::set::{TrackSet, check_finite, check_length};
 pub struct Tcb {
     /// With 1 the velocity at the key is 0, with -1 it is doubled.
     pub tension: f64,
-    /// With -1 the curve has a corner at the key, with 1 a corner to the other side.
+    /// With -1 the curve has a corner at the key; with 1 the corner points the other way, because the curve swings out
+    /// beyond the key before and after it.
     pub continuity: f64,
     /// With 1 the tangent at the key follows the interval before it, with -1 the interval after it.
     pub bias: f64,
