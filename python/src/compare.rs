@@ -284,7 +284,7 @@ pub(crate) struct PathStatistics {
     mean: f64,
     /// The median.
     median: f64,
-    /// The deviation from the mean.
+    /// The standard deviation.
     std: f64,
     /// The smallest.
     min: f64,
@@ -401,7 +401,6 @@ fn of_compare(error: CompareError) -> PyErr {
 
 /// Compares two clips, or two arrays: the largest and the mean difference, and where it is.
 ///
-/// `compare(first, second, *, fps=None, at=None, start=None, end=None, world=False, engine=None)`
 /// Clips are interpolated as their files state, at every key of both and halfway between neighbouring keys, or at `fps`
 /// (from `start` to `end`), or at the times `at`. Tracks are matched by equal names, or by index if neither clip has
 /// names. `world` compares joints in the world instead of relative to their parents. Returns a `ClipDifference`, whose
@@ -537,9 +536,6 @@ fn of_clips(
 
 /// The errors of an estimated trajectory against its reference, as in benchmarks of odometry and SLAM. The
 /// numbers are the same as those of the program `evo`.
-///
-/// `path_errors(reference, estimate, *, align="none", rpe=None, associate="interpolated", max_gap=None,
-/// track=None, engine=None)`
 ///
 /// Both clips have one track, or `track` selects one. They are compared at the times of the clip with fewer poses,
 /// where the other is interpolated by lines and arcs; `associate="nearest:0.01"` takes its nearest pose within 0.01 s,

@@ -187,9 +187,6 @@ impl Crowd {
 
     /// Sets what instances play from now on.
     ///
-    /// `set(instances, clip, *, layer=0, time=0.0, speed=1.0, wrap="loop", weight=1.0, additive=False,
-    /// mask=None)`
-    ///
     /// `instances`: their indices, (n,), or one. `clip`, `time` (seconds of the clip), `speed` and `weight`
     /// are one for all of them or (n,). `wrap`: "hold", "loop" or "mirror", outside of the clip. `weight`:
     /// how much of the layer is laid over those below, 0 to 1. `additive`: the clip's difference from its
@@ -272,8 +269,6 @@ impl Crowd {
 
     /// The poses of all instances at the clock's time: (instances, joints, 3, 4), for column vectors, the
     /// last column the translation; or of "rotations" (instances, joints, 4), x y z w.
-    ///
-    /// `evaluate(values="model", *, dtype="float32", out=None)`
     ///
     /// `values`: "model", "skinning" (times the inverse bind matrices), "local" (in the parents' frames), or
     /// "rotations" (in the parents' frames). `dtype`: "float32" or "float16".

@@ -559,10 +559,11 @@ impl Clip {
         Sampler::of(slf, options)
     }
 
-    /// Draws the components of a track over time, its keys as dots, with matplotlib; gives its axes.
+    /// Draws the components of a track over time, with its keys as dots, with matplotlib; returns the axes of
+    /// matplotlib.
     ///
-    /// `plot(track=0, *, fps=120, axes=None, …)`: `track` is an index or a name, `axes` those
-    /// of matplotlib to draw on, the other options are those of `evaluate`.
+    /// `track` is an index or a name, by default the first track; `fps` is 120 by default; `axes` are those of
+    /// matplotlib to draw on. The other options are those of `evaluate`.
     ///
     /// >>> import tumble
     /// >>> clip = tumble.Clip([0.0, 2.0], [[0, 0, 0, 1], [1, 0, 0, 0]])
@@ -583,8 +584,7 @@ impl Clip {
     /// value of a notebook's cell is shown in its output; `save(path)` writes the page, `html` is
     /// its text.
     ///
-    /// `view(*, methods=None, fps=60, start=None, end=None, height=520)`: the `methods` to choose
-    /// from, names or "all"; `height` is that of the output, pixels.
+    /// `methods`: the names of the methods to choose from, or "all". `height`: the height of the output in pixels.
     ///
     /// >>> import tumble
     /// >>> clip = tumble.Clip([0.0, 2.0], [[0, 0, 0, 1], [1, 0, 0, 0]])
