@@ -129,7 +129,7 @@ fn a_dry_run_names_the_results_that_the_batch_then_makes_skips_and_removes() {
         ]
     );
     let summary =
-        "2 results would be made, 3 skipped (already complete), 1 removed; nothing was written";
+        "2 results would be made, 3 kept (already complete), 1 removed; nothing was written";
     assert!(dry.words.contains(summary), "{}", dry.words);
     assert_eq!(tree(&folder.join("out")), before);
     let json = run_of("eval in -o out -n --resume --prune --json");
@@ -146,7 +146,7 @@ fn a_dry_run_names_the_results_that_the_batch_then_makes_skips_and_removes() {
     );
     // The batch does what was said.
     let done = run_of("eval in -o out --resume --prune");
-    let summary = "2 results made, 3 results of 2 inputs skipped (already complete)";
+    let summary = "2 results made, 3 results of 2 inputs kept (already complete)";
     assert!(done.words.contains(summary), "{}", done.words);
     assert!(!folder.join("out/b.npy").exists() && folder.join("out/d.npy").exists());
     // The reason is the one that applies.

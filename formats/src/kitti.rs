@@ -196,8 +196,9 @@ fn read_rows<R: BufRead>(
             NUMBERS => "",
             _ => ", and those after the first pose",
         };
+        let numbers = number::counted(found);
         let message =
-            format!("{found} numbers where {expected} are expected: three rows of a matrix{after}");
+            format!("{numbers} where {expected} are expected: three rows of a matrix{after}");
         return Err(lines.refuse(column, Code::KittiPose, message));
     }
     let mut rows = [[0.0; 4]; 3];

@@ -186,7 +186,8 @@ impl TrajectoryPoses {
                 ""
             };
             let message = format!(
-                "{found} numbers where {columns} are expected: {}{more}",
+                "{} where {columns} are expected: {}{more}",
+                number::counted(found),
                 format.numbers
             );
             return Err(lines.refuse(column, Code::TumPose, message));

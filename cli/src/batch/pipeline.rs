@@ -796,7 +796,7 @@ impl BatchRecords<'_> {
             if self.skipped_results != self.skipped {
                 skipped += &format!(" of {}", words::count(self.skipped, "input"));
             }
-            parts.push(format!("{skipped} skipped (already complete)"));
+            parts.push(format!("{skipped} kept (already complete)"));
         }
         if self.failed > 0 {
             parts.push(format!("{} failed", words::count(self.failed, "input")));

@@ -106,7 +106,7 @@ impl Preview {
             count => summary += &format!(" ({count} of inputs that failed in the last run)"),
         }
         for (state, done) in [
-            (PreviewState::Kept, "skipped (already complete)"),
+            (PreviewState::Kept, "kept (already complete)"),
             (PreviewState::Pruned, "removed"),
         ] {
             match count(state) {

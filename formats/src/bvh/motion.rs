@@ -364,6 +364,7 @@ fn wrong_count<R: BufRead>(lines: &Lines<R>, line: &str, columns: usize) -> Diag
     let found = tokens(line).count();
     let first_extra = tokens(line).nth(columns).map(|(column, _)| column);
     let column = first_extra.unwrap_or(line.trim_end().len() as u64 + 1);
-    let message = format!("{found} numbers where {columns} are expected, one for each channel");
+    let numbers = number::counted(found);
+    let message = format!("{numbers} where {columns} are expected, one for each channel");
     lines.refuse(column, Code::BvhRow, message)
 }

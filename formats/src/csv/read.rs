@@ -189,7 +189,7 @@ fn check_encoding(name: &str, bytes: &[u8], warnings: &mut Warnings) -> Result<u
     if bytes.starts_with(b"\xef\xbb\xbf") {
         warnings.warn(Code::ByteOrderMark, || {
             let location = Location::Text { line: 1, column: 1 };
-            (Some(location), "a byte-order mark; it is skipped")
+            (Some(location), "a byte-order mark; it is ignored")
         });
         return Ok(3);
     }

@@ -114,7 +114,7 @@ impl Origin<'_> {
                 return Err(self.refuse(key, Code::TimeNotIncreasing, message));
             } else if equal(before, key) {
                 warnings.warn(Code::EqualKeys, || {
-                    let message = format!("two equal keys at time {time}; one is dropped");
+                    let message = format!("two equal keys at time {time}; one is left out");
                     (Some((self.location)(key)), message)
                 });
             } else {

@@ -17,6 +17,14 @@ pub(crate) struct Number {
 /// Why a token is not a number: code and message.
 pub(crate) type Refusal = (Code, String);
 
+/// `1 number`, `4 numbers`.
+pub(crate) fn counted(numbers: usize) -> String {
+    match numbers {
+        1 => "1 number".to_owned(),
+        _ => format!("{numbers} numbers"),
+    }
+}
+
 /// Whether a token is NaN, as languages print it: `nan`, `NaN`, `-nan`.
 pub(crate) fn is_nan(token: &str) -> bool {
     let digits = token.strip_prefix(['-', '+']).unwrap_or(token);
@@ -140,7 +148,7 @@ fn refuse(token: &str) -> Refusal {
     let bare = lower.trim_start_matches(['+', '-']);
     let words = ["nan", "inf", "infinity", "ind", "qnan", "snan"];
     if words.contains(&bare) || bare.contains('#') || bare.starts_with("nan(") {
-        let message = format!("`{token}` is not finite; remove or repair this key");
+        let message = format!("`{token}` is not finite; write a finite number");
         return (Code::NotFinite, message);
     }
     let hint = if bare.starts_with("0x") {
