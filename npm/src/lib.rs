@@ -91,7 +91,7 @@ pub extern "C" fn tumble_answer() -> *const u8 {
     BORDER.with_borrow(|border| border.answer.json.as_ptr())
 }
 
-/// The length of the answer's JSON in bytes.
+/// The length of the answer's JSON, bytes.
 #[unsafe(no_mangle)]
 pub extern "C" fn tumble_answer_bytes() -> usize {
     BORDER.with_borrow(|border| border.answer.json.len())

@@ -121,7 +121,7 @@ impl SampleCall {
     }
 }
 
-/// The largest memory in bytes per sample and track during a call: rotation, translation and scale, their results, and
+/// The largest memory per sample and track during a call, bytes: rotation, translation and scale, their results, and
 /// the copy in the other layout.
 const SAMPLE: f64 = 200.0;
 

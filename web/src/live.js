@@ -3,7 +3,7 @@
 import { loadFrom } from "../../npm/package/core.js";
 import { inflated } from "./data.js";
 
-/** The largest result in bytes that the page evaluates. */
+/** The largest result that the page evaluates, bytes. */
 const LARGEST = 256e6;
 /** The bytes of one sample of one track: rotation, speed and position. */
 const SAMPLE = 48;
