@@ -257,7 +257,7 @@ enum TumbleEnds
    */
   TUMBLE_ENDS_LOOP = 5,
   /*
-   The first and the last segment are constant, with the value of their first key.
+   The first and the last interval are constant, with the value of the first key of each.
    */
   TUMBLE_ENDS_FROZEN = 6,
 };

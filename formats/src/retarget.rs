@@ -81,7 +81,7 @@ pub struct RetargetReport {
     pub resting: Vec<String>,
     /// Joints of the source that nothing follows.
     pub dropped: Vec<String>,
-    /// The dropped joint that rotates furthest from its rest pose, and this angle, degrees; `None` if all rest.
+    /// The dropped joint that rotates furthest from its rest pose, and this angle in degrees; `None` if all rest.
     pub furthest_dropped: Option<(String, f64)>,
     /// By how many degrees the rest pose of each joint of the target was aligned, where it was.
     pub aligned: Vec<(String, f64)>,

@@ -156,7 +156,7 @@ impl ChannelDifference {
 pub(crate) struct JointDifference {
     /// The name of the track.
     track: String,
-    /// The differences of rotations, degrees.
+    /// The differences of rotations in degrees.
     rotation: ChannelDifference,
     /// The differences of translations, as lengths; None if neither clip has translations.
     translation: Option<ChannelDifference>,
@@ -237,7 +237,7 @@ pub(crate) struct ClipDifference {
     span: (f64, f64),
     /// The number of rotations whose bits are the same.
     identical: u64,
-    /// The differences of rotations, degrees.
+    /// The differences of rotations in degrees.
     rotation: ChannelDifference,
     /// The differences of translations, as lengths; None if neither clip has translations.
     translation: Option<ChannelDifference>,
@@ -351,11 +351,11 @@ pub(crate) struct PathErrors {
     translation: [f64; 3],
     /// Absolute errors of the positions, lengths.
     ape_translation: PathStatistics,
-    /// Absolute errors of the rotations, degrees.
+    /// Absolute errors of the rotations in degrees.
     ape_rotation: PathStatistics,
     /// Relative errors of the positions, lengths; None without `rpe`.
     rpe_translation: Option<PathStatistics>,
-    /// Relative errors of the rotations, degrees; None without `rpe`.
+    /// Relative errors of the rotations in degrees; None without `rpe`.
     rpe_rotation: Option<PathStatistics>,
     /// The number of steps for which relative errors are computed.
     rpe_count: usize,

@@ -61,7 +61,7 @@ impl Reduction {
         PyArray1::from_slice(py, &self.times)
     }
 
-    /// The largest angle of all joints at each sample, degrees, (samples,).
+    /// The largest angle of all joints at each sample in degrees: (samples,).
     #[getter]
     fn angles<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         let angles = self.errors.iter().map(|error| error[0].to_degrees());

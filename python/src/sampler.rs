@@ -87,8 +87,8 @@ impl Sampler {
         self.clip.motion.set.track_count()
     }
 
-    /// The memory that the clip takes for each key, in bytes. It is 64, or 144 to 208, and more if the clip keeps segments,
-    /// and 16 and more if it keeps its keys instead, as large clips can do.
+    /// The memory that the clip takes for each key, in bytes: if the clip keeps segments, 64 or more for arcs (slerp),
+    /// and 144 to 208 or more for polynomials; if the clip keeps its keys instead, 16 or more.
     ///
     /// >>> import tumble
     /// >>> sampler = tumble.Clip([0.0, 2.0], [[0, 0, 0, 1], [1, 0, 0, 0]]).sampler(method="slerp")

@@ -14,8 +14,8 @@ use crate::tracks::signs::Signs;
 
 /// The quantity that is evaluated: the rotation, its velocity or its acceleration.
 ///
-/// Velocities and accelerations are vectors, `x y z 0`, from the derivatives of the formula. At a key they are those
-/// of the segment after it, and at the last key those of the last segment. Where the value at an end is held, they
+/// Velocities and accelerations are vectors, `x y z 0`, from the derivatives of the formula. At a key they are those of
+/// the interval after the key, and at the last key those of the last interval. Where the value at an end is held, they
 /// are 0.
 ///
 /// ```
@@ -185,7 +185,7 @@ pub enum Ends {
     Secant,
     /// The curve is closed: the last key equals the first, and the curve is smooth there.
     Loop,
-    /// The first and the last segment are constant, with the value of their first key.
+    /// The first and the last interval are constant, with the value of the first key of each.
     Frozen,
 }
 
@@ -288,7 +288,7 @@ pub enum InterpolationError {
     OpenLoop {
         /// The track's index in the set.
         track: usize,
-        /// The angle between the first key and the last, degrees; `Ends::Loop` needs equal keys.
+        /// The angle between the first key and the last in degrees; `Ends::Loop` needs equal keys.
         degrees: f64,
     },
 }

@@ -172,9 +172,9 @@ impl Engine {
     /// Compares every kernel on the device with its twin on the CPU, bit by bit, for small, ordinary and extreme
     /// inputs.
     ///
-    /// Evaluations check each kernel when they first need it, unless it is known from this process or an earlier one
-    /// to be exact on this device; this function checks all kernels. A kernel that differs is reported and is not an
-    /// error. Empty on the CPU.
+    /// Evaluations check only the kernels that they need, each before its first use, unless a check in this process or
+    /// an earlier one has found the kernel exact on this device. This function checks all kernels. A kernel that
+    /// differs is listed in the result; this is not an error. The result is empty on the CPU.
     ///
     /// # Errors
     /// When the device fails.

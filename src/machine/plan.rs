@@ -1,6 +1,6 @@
 //! The choice of a route, once for each request. A [`Plan`] says how a request is evaluated; it is made from the
-//! request and the [`Limits`] of a machine, and knows no device. Every door of the engine makes a plan and carries it
-//! out, and `explain` prints it.
+//! request and the [`Limits`] of a machine, and knows no device. Every public function of the engine that evaluates
+//! makes a plan and carries it out; `explain` prints the plan.
 //!
 //! Every route gives the same bits; routes differ in the segments that they prepare and keep. If a set has fewer
 //! samples than keys, most prepared segments would never be used, and a set larger than memory cannot be prepared as

@@ -68,7 +68,7 @@ pub struct SelfTestReport {
 }
 
 /// The results of the self-test's expressions without the decorations that forbid the driver to change them. If no
-/// result differs, it is not shown that the comparison can detect differences on this device.
+/// result differs, the comparison has not been shown to detect differences on this device.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
@@ -108,6 +108,6 @@ pub struct KernelCheck {
     pub differing: usize,
     /// Whether nothing was compared now, because the kernel is known to have passed on this device.
     pub remembered: bool,
-    /// Whether it differs, and the engine evaluates with other kernels in its place, which have the CPU's bits.
+    /// Whether the kernel differs and the engine uses other kernels instead, which have the CPU's bits.
     pub replaced: bool,
 }

@@ -60,7 +60,7 @@ pub struct Follower {
     pub up: DVec3,
     /// Upward directions at keys; may be empty.
     pub ups: Vec<Option<DVec3>>,
-    /// Whether the path is closed, and the roll that its frame has gained after one round is removed evenly over it.
+    /// Whether the roll that the frame has gained after one round of a closed path is removed, evenly over the path.
     pub spread: bool,
     /// The speed on the path.
     pub travel: FollowerSpeed,

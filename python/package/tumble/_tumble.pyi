@@ -1641,7 +1641,7 @@ class JointDifference:
         """The name of the track."""
     @property
     def rotation(self) -> ChannelDifference:
-        """The differences of rotations, degrees."""
+        """The differences of rotations in degrees."""
     @property
     def translation(self) -> ChannelDifference | None:
         """The differences of translations, as lengths; None if neither clip has translations."""
@@ -1671,7 +1671,7 @@ class ClipDifference:
         """The number of rotations whose bits are the same."""
     @property
     def rotation(self) -> ChannelDifference:
-        """The differences of rotations, degrees."""
+        """The differences of rotations in degrees."""
     @property
     def translation(self) -> ChannelDifference | None:
         """The differences of translations, as lengths; None if neither clip has translations."""
@@ -1740,13 +1740,13 @@ class PathErrors:
         """Absolute errors of the positions, lengths."""
     @property
     def ape_rotation(self) -> PathStatistics:
-        """Absolute errors of the rotations, degrees."""
+        """Absolute errors of the rotations in degrees."""
     @property
     def rpe_translation(self) -> PathStatistics | None:
         """Relative errors of the positions, lengths; None without `rpe`."""
     @property
     def rpe_rotation(self) -> PathStatistics | None:
-        """Relative errors of the rotations, degrees; None without `rpe`."""
+        """Relative errors of the rotations in degrees; None without `rpe`."""
     @property
     def rpe_count(self) -> int:
         """The number of steps for which relative errors are computed."""
@@ -1809,7 +1809,7 @@ class Reduction:
         """The times of the samples in seconds, (samples,)."""
     @property
     def angles(self) -> _Double:
-        """The largest angle of all joints at each sample, degrees, (samples,)."""
+        """The largest angle of all joints at each sample in degrees: (samples,)."""
     @property
     def distances(self) -> _Double:
         """The largest distance of all joints at each sample, (samples,)."""
@@ -1869,8 +1869,8 @@ class Sampler:
     """Evaluates a clip at one time after another, for loops that need one pose at a time. Made by `Clip.sampler`."""
     @property
     def bytes_per_key(self) -> float:
-        """The memory that the clip takes for each key, in bytes. It is 64, or 144 to 208, and more if the clip keeps segments,
-        and 16 and more if it keeps its keys instead, as large clips can do."""
+        """The memory that the clip takes for each key, in bytes: if the clip keeps segments, 64 or more for arcs (slerp),
+        and 144 to 208 or more for polynomials; if the clip keeps its keys instead, 16 or more."""
     def __len__(self) -> int: ...
     def __copy__(self) -> Sampler: ...
     def __deepcopy__(self, memo: Any, /) -> Sampler: ...

@@ -34,7 +34,7 @@ pub struct ConfigurationRates {
 /// The position and rotation of a body.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BodyPose {
-    /// The position of its origin, metres.
+    /// The position of its origin in metres.
     pub position: DVec3,
     /// Its rotation, a unit quaternion.
     pub rotation: DQuat,
@@ -43,7 +43,7 @@ pub struct BodyPose {
 /// The velocities of a body.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct BodyVelocity {
-    /// The velocity of its origin, m/s.
+    /// The velocity of its origin in m/s.
     pub linear: DVec3,
     /// Its angular velocity in rad/s.
     pub angular: DVec3,

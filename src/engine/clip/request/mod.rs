@@ -32,9 +32,9 @@ use crate::tracks::set::TrackSet;
 
 /// A request for samples of a clip ([`Clip::request`]) or of a set ([`Engine::request`]).
 ///
-/// It selects tracks and samples and sets the layout and the encoding; then one of its functions evaluates it into a
-/// destination. For a set, only the segments that the samples need are prepared, piece by piece if that takes less
-/// memory.
+/// A request selects tracks and samples, and sets the layout and the encoding. Then one of the functions below
+/// evaluates the samples into a destination. For a set, only the segments that the samples need are prepared, piece by
+/// piece if that takes less memory.
 ///
 /// ```
 /// use tumble::{Device, Encoding, Engine, SampleTimes, Layout, TrackSet, method};
