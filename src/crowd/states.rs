@@ -216,8 +216,10 @@ impl MotionTables {
     /// The tables of some clips alone, each once, in this order, with their spans and cells. They give the same states.
     ///
     /// # Errors
-    /// When a clip does not exist or is listed twice, the spans and cells do not belong to the tables, the tables are not those that a
-    /// [`MotionBuilder`](crate::crowd::MotionBuilder) makes, or there is not enough memory.
+    /// * When a clip does not exist or is listed twice.
+    /// * When the spans and cells do not belong to the tables, or no [`MotionBuilder`](crate::crowd::MotionBuilder)
+    ///   made the tables.
+    /// * When there is not enough memory.
     pub fn select(
         &self,
         (spans, cells): (&[[u32; 4]], &[[f32; 4]]),
@@ -368,8 +370,10 @@ impl MotionTables {
     /// `vulkan`, a `DeviceMotions` has the tables on a device, which computes there.
     ///
     /// # Errors
-    /// When a clip does not exist, an array is neither empty nor as long as the instances times the joints, the spans
-    /// and cells do not belong to the tables, the system refuses threads, or the work is stopped.
+    /// * When a clip does not exist.
+    /// * When an array is neither empty nor as long as the instances times the joints.
+    /// * When the spans and cells do not belong to the tables.
+    /// * When the system refuses threads, or the work is stopped.
     pub fn sample_into(
         &self,
         engine: &Engine,

@@ -24,9 +24,11 @@ impl Crowd {
     /// more, more instances may be visible later.
     ///
     /// # Errors
-    /// When the engine was not made by `from_vulkan`, the buffer is null, the range does not start at a multiple of 256
-    /// bytes, is too short or ends beyond the buffer, skinning matrices are requested but the library has no inverse
-    /// bind matrices, or the device fails.
+    /// * When the engine was not made by [`Engine::from_vulkan`](crate::Engine::from_vulkan).
+    /// * When the buffer is null, or the range does not start at a multiple of 256 bytes, is too short, or ends beyond
+    ///   the buffer.
+    /// * When skinning matrices are requested, and the library has no inverse bind matrices.
+    /// * When the device fails.
     ///
     /// # Safety
     /// The buffer must belong to the engine's device, be bound to memory, have the usage `STORAGE_BUFFER`, contain

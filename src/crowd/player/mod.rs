@@ -239,9 +239,10 @@ impl Crowd {
     /// The result is `[instance][joint]`: a rotation, or the three rows of a matrix.
     ///
     /// # Errors
-    /// When `output` is not exactly as long as the result ([`Crowd::output_len`]), skinning matrices are requested
-    /// but the library has no inverse bind matrices, the result of [`Crowd::submit`] was not taken yet, or the device
-    /// fails.
+    /// * When `output` is not exactly as long as the result ([`Crowd::output_len`]).
+    /// * When skinning matrices are requested, and the library has no inverse bind matrices.
+    /// * When the result of [`Crowd::submit`] was not taken yet.
+    /// * When the device fails.
     pub fn evaluate_into(
         &mut self,
         values: CrowdValues,

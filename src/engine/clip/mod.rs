@@ -201,13 +201,12 @@ impl Clip {
         Request::of_clip(self, times)
     }
 
-    /// Prepares the evaluation of single samples and poses on the calling thread, with the bits of
-    /// [`Clip::evaluate`] at listed times. The clip of a Vulkan device is evaluated from the segments that the host
-    /// has, too.
+    /// Prepares the evaluation of single samples and poses on the calling thread, with the bits of [`Clip::evaluate`]
+    /// at listed times. A clip on a Vulkan device is sampled on the host too, which keeps its segments.
     ///
     /// # Errors
-    /// When the segments of the clip exceed the engine's memory limit, so that they are not kept, and samples cannot be
-    /// computed from its keys within the limit.
+    /// When the segments of the clip exceed the engine's memory limit, and samples cannot be computed from the keys of
+    /// the clip within the limit.
     pub fn sampler(&self) -> Result<Sampler, Error> {
         let (clips, tracks) = match &self.tracks {
             ClipTracks::Alike(uploaded) => {

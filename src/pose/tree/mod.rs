@@ -214,8 +214,11 @@ impl Tree {
     /// Makes a tree of bodies, parents before their children.
     ///
     /// # Errors
-    /// When a parent does not come before its child, a name is repeated, a constant is not finite, a rotation or an
-    /// axis does not have the length 1, a free joint is not alone, or a joint mimics none of the others.
+    /// * When a parent does not come before its child, or a name is repeated.
+    /// * When a constant is not finite, or a rotation or an axis does not have the length 1.
+    /// * When a body has another joint beside a free one.
+    /// * When a joint mimics a joint that does not exist, is neither a hinge nor a slide, or mimics the first joint in
+    ///   a circle.
     pub fn new(bodies: Vec<TreeBody>) -> Result<Self, TreeError> {
         check_parents(&bodies)?;
         check_names("bodies", bodies.iter().map(|body| &body.name))?;

@@ -92,8 +92,9 @@ impl TrackSet {
     /// except an identity. `ups` are upward directions at some points: it is empty, or has one entry for each point.
     ///
     /// # Errors
-    /// When there are no points, the lengths differ, the times are not strictly increasing, a number is not finite or
-    /// exceeds 1e30 in magnitude, or an upward direction has no length.
+    /// * When there are no points, or the lengths of the lists differ.
+    /// * When the times are not strictly increasing.
+    /// * When a number is not finite or exceeds 1e30 in magnitude, or an upward direction has no length.
     pub fn push_path<V: Copy + Into<Vec3>>(
         &mut self,
         name: &str,

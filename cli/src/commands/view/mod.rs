@@ -437,7 +437,10 @@ fn bytes(shown: &[ShownClip], methods: &[Vec<ResultChoice>]) -> f64 {
 fn counted_choices(methods: &[Vec<ResultChoice>]) -> String {
     let choices = each_once(methods.iter().flatten());
     let is_authored = |choice: &ResultChoice| *choice == ResultChoice::By(MethodChoice::AUTHORED);
-    let named = choices.iter().filter(|&choice| !is_authored(choice)).count();
+    let named = choices
+        .iter()
+        .filter(|&choice| !is_authored(choice))
+        .count();
     let counted = words::count(named, "method");
     match (named, named < choices.len()) {
         (0, true) => "authored".to_owned(),

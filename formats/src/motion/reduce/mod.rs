@@ -108,8 +108,10 @@ const ROUNDS: usize = 60;
 /// Reduces the keys of a clip.
 ///
 /// # Errors
-/// When a bound is not a finite number of 0 or more, or is smaller than the stored precision; when the parents do not
-/// make a hierarchy; when joints with steps should get keys at the same times; when the clip cannot be evaluated.
+/// * When a bound is not a finite number of 0 or more, or is smaller than the stored precision.
+/// * When the parents do not make a hierarchy.
+/// * When joints with steps should get keys at the same times.
+/// * When the clip cannot be evaluated.
 pub fn reduce(
     clip: &Motion,
     engine: &Engine,
