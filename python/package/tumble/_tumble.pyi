@@ -1033,7 +1033,7 @@ class Engine:
         frame: _Frame = "minimal",
         up: _Up = (0.0, 1.0, 0.0),
         twist: _Twist = "spread",
-        speed: Literal["keys", "constant"] | tuple[float, float] = "keys",
+        speed: Literal["as-keyed", "keys", "constant"] | tuple[float, float] = "keys",
         forward: str = "z",
         upward: str = "y",
         layout: _Layout = "track",

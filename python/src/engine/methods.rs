@@ -677,9 +677,9 @@ impl Engine {
     /// this far ahead instead of along the path; `look_at`: a point or a track's index that it faces. `frame`: how it
     /// is rotated about its direction, "minimal", "fixed" or "frenet", with `up` at the start or everywhere. `twist`:
     /// whether the rotation that remains after a closed path (`ends="loop"`) is spread ("spread") or stays ("free").
-    /// `speed`: "keys" (the default; `--path-speed as-keyed` of the program), "constant", or a pair of fractions of the
-    /// duration: over the first one the speed grows from 0, over the second one it falls to 0. `forward` and `upward`:
-    /// axes of the body, such as "-x".
+    /// `speed`: "keys" or "as-keyed" (the default: the key times), "constant", or a pair of fractions of the duration:
+    /// over the first one the speed grows from 0, over the second one it falls to 0. `forward` and `upward`: axes of
+    /// the body, such as "-x".
     ///
     /// Gives positions (tracks, frames, 3), float32 (float64 far from 0), and rotations (tracks, frames, 4).
     ///
