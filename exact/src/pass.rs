@@ -195,7 +195,8 @@ pub fn workgroup_layouts(module: &[u32]) -> Result<Vec<u32>, PassError> {
     // RowMajor, ColMajor, ArrayStride, MatrixStride, Offset
     const LAYOUT: [u32; 5] = [4, 5, 6, 7, 35];
     let code = instructions(module)?;
-    // The parts of a type are declared before it, and pointers to it after it.
+    // SPIR-V declares the parts of a type before the type, and pointers to the type after it, so one pass over the
+    // module is enough.
     let mut parts = BTreeMap::<u32, &[u32]>::new();
     let (mut shared, mut laid_out) = (BTreeSet::new(), BTreeSet::new());
     for instruction in &code {

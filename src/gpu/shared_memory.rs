@@ -140,7 +140,7 @@ fn allocate(device: &ash::Device, kind: MemoryKind, size: u64) -> Result<Share, 
     };
     if kind.mapped {
         let flags = vk::MemoryMapFlags::empty();
-        // SAFETY: the memory is visible to the host and not mapped yet; freeing it unmaps it.
+        // SAFETY: the memory is visible to the host and not mapped yet; it is unmapped when it is freed.
         let mapped = unsafe { device.map_memory(memory, 0, vk::WHOLE_SIZE, flags) };
         let mapped = mapped.named("vkMapMemory").inspect_err(|_| {
             // SAFETY: nothing uses it.

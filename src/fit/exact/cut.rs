@@ -89,7 +89,7 @@ impl Cutter {
         segments: &mut Vec<PolynomialSegment>,
     ) {
         let mut done = 0;
-        // If the work was stopped, the caller finds this out itself.
+        // If the work was stopped, the caller notices it after this function has returned.
         while done < self.waiting.len() && !stop::is_stopped() {
             let new = || Box::new(FitBlock::new(shape, quantity, Tier::Piece));
             let block = self.block.get_or_insert_with(new);
