@@ -36,7 +36,7 @@ pub(crate) struct Stage<'o> {
 
 /// The destination of consecutive rows in an encoding.
 pub(crate) enum RowStage<'o> {
-    /// As four f32 a value.
+    /// As four f32 per value.
     Values(Stage<'o>),
     Encoded(EncodedStage<'o>),
 }

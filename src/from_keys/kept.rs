@@ -1,5 +1,5 @@
-//! Clips that keep keys instead of segments: 16 bytes a key, and segments for the few intervals that the series of small
-//! angles does not hold. A segment takes 176 bytes, and samples at one time read one for each track.
+//! Clips that keep keys instead of segments: 16 bytes per key, and segments for the few intervals that the series of
+//! small angles does not hold. A segment takes 176 bytes, and samples at one time read one for each track.
 
 use bytemuck::Zeroable;
 

@@ -154,13 +154,13 @@ macro_rules! representations {
 }
 
 representations! {
-    /// `x y z w`, f32: 16 bytes a rotation.
+    /// `x y z w`, f32: 16 bytes per rotation.
     #[default]
     F32 {
         kinds: [Self::F32],
         ..QUATERNION
     }
-    /// `x y z w` in IEEE 754 half precision, rounded to nearest, ties to even: 8 bytes a
+    /// `x y z w` in IEEE 754 half precision, rounded to nearest, ties to even: 8 bytes per
     /// rotation, within 2^-12 of each component.
     F16 {
         kinds: [Self::F16],
@@ -173,7 +173,7 @@ representations! {
         ..OF_ROTATIONS
     }
     /// `x y z w` as multiples of 1/32767 in 16 bits, rounded to nearest, ties to even
-    /// (`VK_FORMAT_R16G16B16A16_SNORM`): 8 bytes a rotation, within 1.6e-5 of each component.
+    /// (`VK_FORMAT_R16G16B16A16_SNORM`): 8 bytes per rotation, within 1.6e-5 of each component.
     Snorm16 {
         kinds: [Self::Snorm16],
         name: "snorm16",
