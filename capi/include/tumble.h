@@ -842,11 +842,11 @@ typedef struct TumbleVulkan {
    */
   uint32_t copy_queue_family;
   /*
-   A function that locks `queue`, or null. The library calls it with `queue_user` before each submission to
-   `queue`, on any thread, and `unlock_queue` after it. The application must use the same lock for `queue`, and
-   must not have it locked when it calls the library, which would wait forever. If `lock_queue` is null,
-   `unlock_queue` must be null too, and the application must not use `queue` during a call that submits to it.
-   Several engines on one queue need no lock among themselves.
+   A function that locks `queue`, or null. The library calls this function with `queue_user` before each submission
+   to `queue`, on any thread, and `unlock_queue` after the submission. The application must use the same lock for
+   `queue`, and must not hold the lock when it calls the library, which would wait forever. If `lock_queue` is
+   null, `unlock_queue` must be null too, and the application must not use `queue` during a call that submits to
+   it. Several engines on one queue need no lock among themselves.
    */
   void (*lock_queue)(void *user);
   /*
@@ -854,15 +854,15 @@ typedef struct TumbleVulkan {
    */
   void (*unlock_queue)(void *user);
   /*
-   The argument of both functions. It must stay valid until the engine and all objects that were made with it are
-   freed.
+   The argument of `lock_queue` and `unlock_queue`. It must stay valid until the engine and all objects that were
+   made with it are freed.
    */
   void *queue_user;
   /*
    The application's `VkPipelineCache`, in which the library makes its pipelines, or 0 (`VK_NULL_HANDLE`). It must
    not be synchronized externally, and must stay valid until the engine and all objects that were made with it are
-   freed. The library neither reads it from a file nor writes it to one. 0: the library makes a cache and keeps it
-   in a file (`TumbleEngineOptions.cache_directory`).
+   freed. The library neither reads this cache from a file nor writes it to one. 0: the library makes a cache and
+   keeps it in a file (`TumbleEngineOptions.cache_directory`).
    */
   uint64_t pipeline_cache;
 } TumbleVulkan;
@@ -1067,8 +1067,8 @@ size_t tumble_set_key_count(const struct TumbleSet *set);
 /*
  Returns pointers to the key times and the rotation keys of the track `index`, counted from 0.
 
- `times` receives a pointer to `key_count` numbers in seconds, and `keys` a pointer to 4 × `key_count` numbers,
- `x y z w` for each key. The arrays belong to the set: they stay valid until a track is pushed to it or it is
+ `times` receives a pointer to `key_count` numbers in seconds, and `keys` a pointer to 4 × `key_count` numbers, `x y
+ z w` for each key. The arrays belong to the set and stay valid until a track is pushed to the set, or the set is
  freed.
 
  # Errors
@@ -1549,12 +1549,12 @@ TumbleResult tumble_request_evaluate(const struct TumbleClip *clip,
  Prepares the recording of a request of a clip, whose result goes to a range of the application's Vulkan buffer.
 
  Kernels are compiled and work lists are uploaded here, not when a frame is recorded. The clip's engine must have
- been created by `tumble_engine_from_vulkan`; this call submits to its queue. `buffer` is the `VkBuffer`, as a
- number: `(uint64_t)buffer`. The range starts at `offset`, a multiple of the bytes of a value (16 for "f32"), and
- has `size` bytes, at least those of `tumble_request_bytes`. The buffer must belong to the engine's device, be
- bound to memory, and have the usages `VK_BUFFER_USAGE_STORAGE_BUFFER_BIT` and `VK_BUFFER_USAGE_TRANSFER_DST_BIT`.
+ been created by `tumble_engine_from_vulkan`. This call submits to the engine's queue. `buffer` is the `VkBuffer`, as
+ a number: `(uint64_t)buffer`. The range starts at `offset`, a multiple of the bytes of a value (16 for "f32"), and
+ has `size` bytes, at least those of `tumble_request_bytes`. The buffer must belong to the engine's device, be bound
+ to memory, and have the usages `VK_BUFFER_USAGE_STORAGE_BUFFER_BIT` and `VK_BUFFER_USAGE_TRANSFER_DST_BIT`.
 
- The target needs neither the clip nor the engine afterwards. The application frees it with
+ The target needs neither the clip nor the engine afterwards. The application frees the target with
  `tumble_clip_target_free` before it destroys the buffer or the device.
 
  # Errors
@@ -1619,8 +1619,8 @@ TumbleResult tumble_pass_bytes(const struct TumbleEngine *engine,
                                uint64_t *bytes);
 
 /*
- Runs a pass with its result in a range of a buffer, and waits for it. Commands that are submitted to the engine's
- queue afterwards see the result; the inputs may be written by commands that were submitted there before.
+ Runs a pass whose result goes to a range of a buffer, and waits for the result. Commands that are submitted to the
+ engine's queue afterwards see the result; the inputs may be written by commands that were submitted there before.
 
  The range starts at a multiple of 256, has at least the bytes of `tumble_pass_bytes`, and does not overlap an
  input. All buffers must belong to the engine's device, be bound to memory, and have the usage
@@ -1645,10 +1645,10 @@ TumbleResult tumble_pass_to_buffer(const struct TumbleEngine *engine,
 /*
  Prepares the recording of a pass, whose result goes to a range of the application's Vulkan buffer.
 
- The kernel is compiled and memory is allocated here, not when a frame is recorded; this call submits to the
- engine's queue when it checks a new kernel. The buffers must be as `tumble_pass_to_buffer` says. The target does
- not need the engine afterwards. The application frees it with `tumble_pass_target_free` before it destroys a buffer
- or the device.
+ The kernel is compiled and memory is allocated here, not when a frame is recorded. If the kernel was not checked
+ before, this call checks it, and then submits to the engine's queue. The buffers must be as `tumble_pass_to_buffer`
+ says. The target does not need the engine afterwards. The application frees the target with
+ `tumble_pass_target_free` before it destroys a buffer or the device.
 
  # Errors
  As `tumble_pass_to_buffer`.
@@ -1774,9 +1774,9 @@ TumbleResult tumble_engine_from_vulkan(const struct TumbleVulkan *vulkan,
  Creates an empty library for a skeleton of `joint_count` joints.
 
  `parents` are the indices of the joints' parents, -1 for a root; parents may come after their children. `offsets`
- are three numbers `x y z` for each joint: its position in the parent's frame in clips that have no translations
- for it. Null: all are 0. `ticks_per_second` is the number of ticks in a second, 0 for 705 600. A clip has up to
- 2 147 221 504 ticks, which are 50 minutes by default. The arrays are copied. The caller frees the library with
+ are three numbers `x y z` for each joint: the position in the parent's frame, for clips without translations of the
+ joint. Null: all are 0. `ticks_per_second` is the number of ticks in a second, 0 for 705 600. A clip has up to 2 147
+ 221 504 ticks, which are 50 minutes by default. The arrays are copied. The caller frees the library with
  `tumble_crowd_library_free`.
 
  # Errors
@@ -2272,11 +2272,11 @@ TumbleResult tumble_crowd_wait_half(struct TumbleCrowd *crowd,
  Prepares the recording of evaluations of a crowd, whose results go to a range of the application's Vulkan buffer.
 
  Kernels are compiled and memory is allocated here, not when a frame is recorded. The crowd's engine must have been
- created by `tumble_engine_from_vulkan`; this call submits to its queue when it checks a new kernel. `values` is a
- `TumbleCrowdValues`. `half` is 0 for numbers of 32 bits, 1 for 16 bits. `buffer` is the `VkBuffer`, as a number:
- `(uint64_t)buffer`. The range starts at `offset`, a multiple of 256, and has `size` bytes: at least
- `tumble_crowd_output_count` × 4, or × 2 with `half` 1, and room for one instance. If it has room for more
- instances than are visible now, more may be visible later.
+ created by `tumble_engine_from_vulkan`. This call checks kernels that were not checked before, and then submits to
+ the engine's queue. `values` is a `TumbleCrowdValues`. `half` is 0 for numbers of 32 bits, 1 for 16 bits. `buffer`
+ is the `VkBuffer`, as a number: `(uint64_t)buffer`. The range starts at `offset`, a multiple of 256, and has `size`
+ bytes: at least `tumble_crowd_output_count` × 4, or × 2 with `half` 1, and room for one instance. If it has room for
+ more instances than are visible now, more may be visible later.
 
  The buffer must belong to the engine's device, be bound to memory, and have the usage
  `VK_BUFFER_USAGE_STORAGE_BUFFER_BIT`. The application frees the target with `tumble_crowd_target_free` before it

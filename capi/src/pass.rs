@@ -208,8 +208,8 @@ pub unsafe extern "C" fn tumble_pass_bytes(
     })
 }
 
-/// Runs a pass with its result in a range of a buffer, and waits for it. Commands that are submitted to the engine's
-/// queue afterwards see the result; the inputs may be written by commands that were submitted there before.
+/// Runs a pass whose result goes to a range of a buffer, and waits for the result. Commands that are submitted to the
+/// engine's queue afterwards see the result; the inputs may be written by commands that were submitted there before.
 ///
 /// The range starts at a multiple of 256, has at least the bytes of `tumble_pass_bytes`, and does not overlap an
 /// input. All buffers must belong to the engine's device, be bound to memory, and have the usage
@@ -252,10 +252,10 @@ impl Object for TumblePassTarget {
 
 /// Prepares the recording of a pass, whose result goes to a range of the application's Vulkan buffer.
 ///
-/// The kernel is compiled and memory is allocated here, not when a frame is recorded; this call submits to the
-/// engine's queue when it checks a new kernel. The buffers must be as `tumble_pass_to_buffer` says. The target does
-/// not need the engine afterwards. The application frees it with `tumble_pass_target_free` before it destroys a buffer
-/// or the device.
+/// The kernel is compiled and memory is allocated here, not when a frame is recorded. If the kernel was not checked
+/// before, this call checks it, and then submits to the engine's queue. The buffers must be as `tumble_pass_to_buffer`
+/// says. The target does not need the engine afterwards. The application frees the target with
+/// `tumble_pass_target_free` before it destroys a buffer or the device.
 ///
 /// # Errors
 /// As `tumble_pass_to_buffer`.

@@ -209,12 +209,12 @@ impl Object for TumbleClipTarget {
 /// Prepares the recording of a request of a clip, whose result goes to a range of the application's Vulkan buffer.
 ///
 /// Kernels are compiled and work lists are uploaded here, not when a frame is recorded. The clip's engine must have
-/// been created by `tumble_engine_from_vulkan`; this call submits to its queue. `buffer` is the `VkBuffer`, as a
-/// number: `(uint64_t)buffer`. The range starts at `offset`, a multiple of the bytes of a value (16 for "f32"), and
-/// has `size` bytes, at least those of `tumble_request_bytes`. The buffer must belong to the engine's device, be
-/// bound to memory, and have the usages `VK_BUFFER_USAGE_STORAGE_BUFFER_BIT` and `VK_BUFFER_USAGE_TRANSFER_DST_BIT`.
+/// been created by `tumble_engine_from_vulkan`. This call submits to the engine's queue. `buffer` is the `VkBuffer`, as
+/// a number: `(uint64_t)buffer`. The range starts at `offset`, a multiple of the bytes of a value (16 for "f32"), and
+/// has `size` bytes, at least those of `tumble_request_bytes`. The buffer must belong to the engine's device, be bound
+/// to memory, and have the usages `VK_BUFFER_USAGE_STORAGE_BUFFER_BIT` and `VK_BUFFER_USAGE_TRANSFER_DST_BIT`.
 ///
-/// The target needs neither the clip nor the engine afterwards. The application frees it with
+/// The target needs neither the clip nor the engine afterwards. The application frees the target with
 /// `tumble_clip_target_free` before it destroys the buffer or the device.
 ///
 /// # Errors

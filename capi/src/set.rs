@@ -145,8 +145,8 @@ fn track(set: &TrackSet, index: usize) -> Result<Track<'_>, Failure> {
 
 /// Returns pointers to the key times and the rotation keys of the track `index`, counted from 0.
 ///
-/// `times` receives a pointer to `key_count` numbers in seconds, and `keys` a pointer to 4 × `key_count` numbers,
-/// `x y z w` for each key. The arrays belong to the set: they stay valid until a track is pushed to it or it is
+/// `times` receives a pointer to `key_count` numbers in seconds, and `keys` a pointer to 4 × `key_count` numbers, `x y
+/// z w` for each key. The arrays belong to the set and stay valid until a track is pushed to the set, or the set is
 /// freed.
 ///
 /// # Errors

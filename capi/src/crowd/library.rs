@@ -74,9 +74,9 @@ impl TumbleCrowdLibrary {
 /// Creates an empty library for a skeleton of `joint_count` joints.
 ///
 /// `parents` are the indices of the joints' parents, -1 for a root; parents may come after their children. `offsets`
-/// are three numbers `x y z` for each joint: its position in the parent's frame in clips that have no translations
-/// for it. Null: all are 0. `ticks_per_second` is the number of ticks in a second, 0 for 705 600. A clip has up to
-/// 2 147 221 504 ticks, which are 50 minutes by default. The arrays are copied. The caller frees the library with
+/// are three numbers `x y z` for each joint: the position in the parent's frame, for clips without translations of the
+/// joint. Null: all are 0. `ticks_per_second` is the number of ticks in a second, 0 for 705 600. A clip has up to 2 147
+/// 221 504 ticks, which are 50 minutes by default. The arrays are copied. The caller frees the library with
 /// `tumble_crowd_library_free`.
 ///
 /// # Errors

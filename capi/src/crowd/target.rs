@@ -24,11 +24,11 @@ impl Object for TumbleCrowdTarget {
 /// Prepares the recording of evaluations of a crowd, whose results go to a range of the application's Vulkan buffer.
 ///
 /// Kernels are compiled and memory is allocated here, not when a frame is recorded. The crowd's engine must have been
-/// created by `tumble_engine_from_vulkan`; this call submits to its queue when it checks a new kernel. `values` is a
-/// `TumbleCrowdValues`. `half` is 0 for numbers of 32 bits, 1 for 16 bits. `buffer` is the `VkBuffer`, as a number:
-/// `(uint64_t)buffer`. The range starts at `offset`, a multiple of 256, and has `size` bytes: at least
-/// `tumble_crowd_output_count` × 4, or × 2 with `half` 1, and room for one instance. If it has room for more
-/// instances than are visible now, more may be visible later.
+/// created by `tumble_engine_from_vulkan`. This call checks kernels that were not checked before, and then submits to
+/// the engine's queue. `values` is a `TumbleCrowdValues`. `half` is 0 for numbers of 32 bits, 1 for 16 bits. `buffer`
+/// is the `VkBuffer`, as a number: `(uint64_t)buffer`. The range starts at `offset`, a multiple of 256, and has `size`
+/// bytes: at least `tumble_crowd_output_count` × 4, or × 2 with `half` 1, and room for one instance. If it has room for
+/// more instances than are visible now, more may be visible later.
 ///
 /// The buffer must belong to the engine's device, be bound to memory, and have the usage
 /// `VK_BUFFER_USAGE_STORAGE_BUFFER_BIT`. The application frees the target with `tumble_crowd_target_free` before it

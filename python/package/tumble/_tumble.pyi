@@ -359,8 +359,8 @@ class Clip:
         its last. Keys keep their times and bits. A channel without a key at a cut gets one there, of its curve. Steps,
         lines and arcs stay the same; smooth curves change in the intervals next to the cuts."""
     def retime(self, *, speed: float | None = None, start: float | None = None) -> Clip:
-        """Returns the clip, played `speed` times as fast. Its first key is moved to `start` (in seconds); without `start`,
-        it stays at its time. Keys keep their bits; velocities and tangents are multiplied by the speed."""
+        """Returns the clip, played `speed` times as fast. The first key is moved to `start` (in seconds); without `start`,
+        the key stays at its time. Keys keep their bits; velocities and tangents are multiplied by the speed."""
     @staticmethod
     def concat(clips: Sequence[Clip], *, gap: float | None = None) -> Clip:
         """Several clips, one after another. Joints are matched by name, and have the order and the name of the first clip.

@@ -429,8 +429,8 @@ impl Clip {
         Ok(self.with_keys(part))
     }
 
-    /// Returns the clip, played `speed` times as fast. Its first key is moved to `start` (in seconds); without `start`,
-    /// it stays at its time. Keys keep their bits; velocities and tangents are multiplied by the speed.
+    /// Returns the clip, played `speed` times as fast. The first key is moved to `start` (in seconds); without `start`,
+    /// the key stays at its time. Keys keep their bits; velocities and tangents are multiplied by the speed.
     ///
     /// >>> import tumble
     /// >>> clip = tumble.Clip([0.0, 1.0], [[0, 0, 0, 1], [1, 0, 0, 0]])
