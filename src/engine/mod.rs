@@ -91,7 +91,7 @@ impl Engine {
     /// * When the options are out of range.
     /// * When the device fails the self-test, and [`EngineOptions::allow_inexact`] is off.
     ///
-    ///  Each kernel is checked later, when an evaluation first needs it; if it differs from the CPU, that evaluation
+    /// Each kernel is checked later, when an evaluation first needs it; if it differs from the CPU, that evaluation
     /// fails with [`VulkanError::InexactKernel`](crate::vulkan::VulkanError::InexactKernel).
     pub fn with_options(device: Device, options: &EngineOptions) -> Result<Self, Error> {
         VectorWidth::limit().map_err(Error::VectorWidth)?;

@@ -62,7 +62,7 @@ pub(crate) struct PipelineInputs {
 pub(crate) struct BatchOptions {
     /// Everything that determines a result besides its input.
     pub(crate) options: ResultOptions,
-    /// Results that are done are skipped.
+    /// Results that are done are kept.
     pub(crate) resume: bool,
     /// Results of other inputs are replaced.
     pub(crate) overwrite: bool,
