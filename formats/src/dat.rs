@@ -15,7 +15,7 @@ use std::path::Path;
 
 use glam::{DQuat, Quat};
 
-use crate::diagnostic::{Code, Diagnostic};
+use crate::diagnostic::{Code, Diagnostic, counted};
 use crate::feature::Feature;
 use crate::format::{Format, FormatOption, Loaded, ReadOptions};
 use crate::motion::Motion;
@@ -257,7 +257,7 @@ impl DatKeys {
         if found == expected {
             return Ok(());
         }
-        let numbers = number::counted(found);
+        let numbers = counted(found, "number", "numbers");
         let message = format!("{numbers} where {expected} are expected: a time and 4 for each box");
         let column = extra.unwrap_or(line.trim_end().len() as u64 + 1);
         Err(lines.refuse(column, Code::Columns, message))

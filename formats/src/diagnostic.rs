@@ -5,6 +5,12 @@ use std::fmt;
 
 use crate::printable::printable;
 
+/// `1 number`, `4 numbers`; `plural` is the word for all numbers but 1.
+pub(crate) fn counted(number: usize, singular: &str, plural: &str) -> String {
+    let noun = if number == 1 { singular } else { plural };
+    format!("{number} {noun}")
+}
+
 /// Whether an input is refused, or read with a warning.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Severity {

@@ -17,14 +17,6 @@ pub(crate) struct Number {
 /// Why a token is not a number: code and message.
 pub(crate) type Refusal = (Code, String);
 
-/// `1 number`, `4 numbers`.
-pub(crate) fn counted(numbers: usize) -> String {
-    match numbers {
-        1 => "1 number".to_owned(),
-        _ => format!("{numbers} numbers"),
-    }
-}
-
 /// Whether a token is NaN, as languages print it: `nan`, `NaN`, `-nan`.
 pub(crate) fn is_nan(token: &str) -> bool {
     let digits = token.strip_prefix(['-', '+']).unwrap_or(token);
