@@ -985,8 +985,8 @@ const char *tumble_last_error(void);
  `tumble_engine_free`.
 
  # Errors
- `TUMBLE_RESULT_DEVICE` if there is no such device, it cannot be opened, or it fails the self-test;
- `TUMBLE_RESULT_INVALID_ARGUMENT` if an option is out of its range.
+ - `TUMBLE_RESULT_DEVICE` if there is no such device, it cannot be opened, or it fails the self-test.
+ - `TUMBLE_RESULT_INVALID_ARGUMENT` if an option is out of its range.
 
  # Safety
  `device` must be null or a text that ends with a zero byte, `options` must be null or point to a
@@ -1091,8 +1091,9 @@ TumbleResult tumble_set_track(const struct TumbleSet *set,
  If `buffer` is null, only `length` is written.
 
  # Errors
- `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such track; `TUMBLE_RESULT_WRONG_SIZE` if `buffer` is not null and
- `size` is less than the length + 1: then `length` is written, and `buffer` is not.
+ - `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such track.
+ - `TUMBLE_RESULT_WRONG_SIZE` if `buffer` is not null and `size` is less than the length + 1: then `length` is
+   written, and `buffer` is not.
 
  # Safety
  `buffer` must be null or have `size` bytes, and `length` must point to memory for a number.
@@ -1259,9 +1260,11 @@ TumbleResult tumble_set_sample_count(const struct TumbleSet *set,
  copy.
 
  # Errors
- `TUMBLE_RESULT_WRONG_SIZE` if `output_count` is another number; `TUMBLE_RESULT_INVALID_INPUT` if the sample times
- are invalid, or a track cannot be interpolated as requested; `TUMBLE_RESULT_DEVICE` if the device fails. All
- arguments are checked before anything is written.
+ - `TUMBLE_RESULT_WRONG_SIZE` if `output_count` is another number.
+ - `TUMBLE_RESULT_INVALID_INPUT` if the sample times are invalid, or a track cannot be interpolated as requested.
+ - `TUMBLE_RESULT_DEVICE` if the device fails.
+
+ All arguments are checked before anything is written.
 
  # Safety
  `interpolation` must be null or point to a `TumbleInterpolation` whose `method` is null or a text that ends with a
@@ -1283,8 +1286,8 @@ TumbleResult tumble_evaluate(const struct TumbleEngine *engine,
  before it. The caller frees the clip with `tumble_clip_free`.
 
  # Errors
- `TUMBLE_RESULT_INVALID_INPUT` if a track cannot be interpolated as requested; `TUMBLE_RESULT_OUT_OF_MEMORY` or
- `TUMBLE_RESULT_DEVICE` if the device lacks memory or fails.
+ - `TUMBLE_RESULT_INVALID_INPUT` if a track cannot be interpolated as requested.
+ - `TUMBLE_RESULT_OUT_OF_MEMORY` or `TUMBLE_RESULT_DEVICE` if the device lacks memory or fails.
 
  # Safety
  `interpolation` must be null or point to a `TumbleInterpolation` whose `method` is null or a text that ends with a
@@ -1347,8 +1350,9 @@ TumbleResult tumble_clip_evaluate(const struct TumbleClip *clip,
  returns when the result is written. Commands that are submitted to the queue afterwards see it.
 
  # Errors
- `TUMBLE_RESULT_INVALID_ARGUMENT` if the engine was not created by `tumble_engine_from_vulkan`;
- `TUMBLE_RESULT_WRONG_SIZE` if the range is not aligned or too short; otherwise as `tumble_evaluate`.
+ - `TUMBLE_RESULT_INVALID_ARGUMENT` if the engine was not created by `tumble_engine_from_vulkan`.
+ - `TUMBLE_RESULT_WRONG_SIZE` if the range is not aligned or too short.
+ - Otherwise as `tumble_evaluate`.
 
  # Safety
  `samples` must point to a `TumbleSamples` whose `times` has `time_count` numbers. The buffer must be as described,
@@ -1396,7 +1400,8 @@ TumbleResult tumble_sampler_copy(const struct TumbleSampler *sampler,
  clip's interpolation. Nothing is allocated.
 
  # Errors
- `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such track; `TUMBLE_RESULT_INVALID_INPUT` if the time is not finite.
+ - `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such track.
+ - `TUMBLE_RESULT_INVALID_INPUT` if the time is not finite.
 
  # Safety
  `value` must have four floats, which nothing else uses during the call.
@@ -1411,8 +1416,8 @@ TumbleResult tumble_sampler_sample(const struct TumbleSampler *sampler,
  `output_count` is the number of floats. Nothing is allocated.
 
  # Errors
- `TUMBLE_RESULT_WRONG_SIZE` if `output_count` is not 4 × tracks; `TUMBLE_RESULT_INVALID_INPUT` if the time is not
- finite.
+ - `TUMBLE_RESULT_WRONG_SIZE` if `output_count` is not 4 × tracks.
+ - `TUMBLE_RESULT_INVALID_INPUT` if the time is not finite.
 
  # Safety
  `output` must have `output_count` floats, which nothing else uses during the call.
@@ -1427,8 +1432,9 @@ TumbleResult tumble_sampler_pose(const struct TumbleSampler *sampler,
  `track_count` indices in `tracks`. `output_count` is the number of floats. Nothing is allocated.
 
  # Errors
- `TUMBLE_RESULT_WRONG_SIZE` if `output_count` is not 4 × `track_count`; `TUMBLE_RESULT_OUT_OF_RANGE` if there is no
- such track; `TUMBLE_RESULT_INVALID_INPUT` if the time is not finite.
+ - `TUMBLE_RESULT_WRONG_SIZE` if `output_count` is not 4 × `track_count`.
+ - `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such track.
+ - `TUMBLE_RESULT_INVALID_INPUT` if the time is not finite.
 
  # Safety
  `tracks` must have `track_count` numbers, and `output` must have `output_count` floats, which nothing else uses
@@ -1484,8 +1490,10 @@ size_t tumble_set_scalar_count(const struct TumbleSet *set);
  floats, exactly scalars × samples (`tumble_set_scalar_count`, `tumble_set_sample_count`).
 
  # Errors
- `TUMBLE_RESULT_WRONG_SIZE` if `output_count` is another number; otherwise as `tumble_evaluate`. On an error nothing
- is written.
+ - `TUMBLE_RESULT_WRONG_SIZE` if `output_count` is another number.
+ - Otherwise as `tumble_evaluate`.
+
+ On an error nothing is written.
 
  # Safety
  As `tumble_evaluate`.
@@ -1514,9 +1522,10 @@ const char *tumble_encoding_name(size_t index);
  Returns the size of a request's result in bytes.
 
  # Errors
- `TUMBLE_RESULT_INVALID_ARGUMENT` if a constant or a name is unknown; `TUMBLE_RESULT_OUT_OF_RANGE` if the clip does
- not have these tracks or samples; `TUMBLE_RESULT_INVALID_INPUT` if the sample times are invalid, or the encoding
- is for rotations and the clip's quantity is a velocity or an acceleration.
+ - `TUMBLE_RESULT_INVALID_ARGUMENT` if a constant or a name is unknown.
+ - `TUMBLE_RESULT_OUT_OF_RANGE` if the clip does not have these tracks or samples.
+ - `TUMBLE_RESULT_INVALID_INPUT` if the sample times are invalid, or the encoding is for rotations and the clip's
+   quantity is a velocity or an acceleration.
 
  # Safety
  `request` must point to a `TumbleRequest` whose pointers are null or as its members say, and `bytes` must point to
@@ -1533,8 +1542,11 @@ TumbleResult tumble_request_bytes(const struct TumbleClip *clip,
  `tumble_request_bytes`. Memory that is aligned to 16 bytes is filled without a copy.
 
  # Errors
- As `tumble_request_bytes`; also `TUMBLE_RESULT_WRONG_SIZE` if `output_bytes` is another number, and
- `TUMBLE_RESULT_DEVICE` if the device fails. All arguments are checked before anything is written.
+ - As `tumble_request_bytes`.
+ - `TUMBLE_RESULT_WRONG_SIZE` if `output_bytes` is another number.
+ - `TUMBLE_RESULT_DEVICE` if the device fails.
+
+ All arguments are checked before anything is written.
 
  # Safety
  `request` must point to a `TumbleRequest` whose pointers are null or as its members say, and `output` must have
@@ -1558,8 +1570,9 @@ TumbleResult tumble_request_evaluate(const struct TumbleClip *clip,
  `tumble_clip_target_free` before it destroys the buffer or the device.
 
  # Errors
- As `tumble_request_bytes`; also `TUMBLE_RESULT_INVALID_ARGUMENT` if the engine was not created by
- `tumble_engine_from_vulkan`, and `TUMBLE_RESULT_WRONG_SIZE` if the range is not aligned or too short.
+ - As `tumble_request_bytes`.
+ - `TUMBLE_RESULT_INVALID_ARGUMENT` if the engine was not created by `tumble_engine_from_vulkan`.
+ - `TUMBLE_RESULT_WRONG_SIZE` if the range is not aligned or too short.
 
  # Safety
  `request` must point to a `TumbleRequest` whose pointers are null or as its members say; the buffer must be as
@@ -1606,9 +1619,10 @@ TumbleResult tumble_clip_target_free(struct TumbleClipTarget *target);
  `TUMBLE_PASS_OPERATION_WORLD`, whose result is a rotation `x y z w` and a position `x y z 0` each.
 
  # Errors
- `TUMBLE_RESULT_INVALID_ARGUMENT` if a constant is unknown, the number of inputs or weights is not the operation's,
- or the engine was not created by `tumble_engine_from_vulkan`; `TUMBLE_RESULT_INVALID_POINTER` if an array is null;
- `TUMBLE_RESULT_INVALID_INPUT` if the skeleton is refused.
+ - `TUMBLE_RESULT_INVALID_ARGUMENT` if a constant is unknown, the number of inputs or weights is not the operation's,
+   or the engine was not created by `tumble_engine_from_vulkan`.
+ - `TUMBLE_RESULT_INVALID_POINTER` if an array is null.
+ - `TUMBLE_RESULT_INVALID_INPUT` if the skeleton is refused.
 
  # Safety
  `pass` must point to a `TumblePass` whose pointers are null or as its members say, and `bytes` must point to memory
@@ -1628,9 +1642,11 @@ TumbleResult tumble_pass_bytes(const struct TumbleEngine *engine,
  `VK_BUFFER_USAGE_TRANSFER_SRC_BIT` too. This call submits to the engine's queue.
 
  # Errors
- As `tumble_pass_bytes`; also `TUMBLE_RESULT_WRONG_SIZE` if a range is not aligned or too short;
- `TUMBLE_RESULT_INVALID_ARGUMENT` if there is no layer, a weight is out of its range, the layout for a skeleton is
- track by track, or the result overlaps an input; `TUMBLE_RESULT_DEVICE` if the device fails.
+ - As `tumble_pass_bytes`.
+ - `TUMBLE_RESULT_WRONG_SIZE` if a range is not aligned or too short.
+ - `TUMBLE_RESULT_INVALID_ARGUMENT` if there is no layer, a weight is out of its range, the layout for a skeleton is
+   track by track, or the result overlaps an input.
+ - `TUMBLE_RESULT_DEVICE` if the device fails.
 
  # Safety
  `pass` must point to a `TumblePass` whose pointers are null or as its members say; the buffers must be as
@@ -1713,9 +1729,11 @@ TumbleResult tumble_pass_target_free(struct TumblePassTarget *target);
  arrays are copied.
 
  # Errors
- `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such track; `TUMBLE_RESULT_INVALID_INPUT` if the times are not finite
- and strictly increasing, or a number is not finite or exceeds 1e30 in magnitude. After any error the set is
- unchanged.
+ - `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such track.
+ - `TUMBLE_RESULT_INVALID_INPUT` if the times are not finite and strictly increasing, or a number is not finite or
+   exceeds 1e30 in magnitude.
+
+ After any error the set is unchanged.
 
  # Safety
  `times` must have `key_count` numbers and `keys` 3 × `key_count`; `tangents` must be null or have 6 × `key_count`.
@@ -1758,9 +1776,10 @@ TumbleResult tumble_set_scales(struct TumbleSet *set,
  one queue: they take turns.
 
  # Errors
- `TUMBLE_RESULT_INVALID_POINTER` if a required handle or function is null; `TUMBLE_RESULT_INVALID_ARGUMENT` if the
- version is below 1.1 or above the loader's, or the physical device or a queue family does not fit;
- `TUMBLE_RESULT_DEVICE` if the device fails the self-test.
+ - `TUMBLE_RESULT_INVALID_POINTER` if a required handle or function is null.
+ - `TUMBLE_RESULT_INVALID_ARGUMENT` if the version is below 1.1 or above the loader's, or the physical device or a
+   queue family does not fit.
+ - `TUMBLE_RESULT_DEVICE` if the device fails the self-test.
 
  # Safety
  `vulkan` must point to a `TumbleVulkan` whose handles are valid, belong together and live as long as described;
@@ -1780,9 +1799,9 @@ TumbleResult tumble_engine_from_vulkan(const struct TumbleVulkan *vulkan,
  `tumble_crowd_library_free`.
 
  # Errors
- `TUMBLE_RESULT_INVALID_ARGUMENT` if a parent is negative but not -1, or there are too many ticks in a second;
- `TUMBLE_RESULT_INVALID_INPUT` if there are no joints, a parent does not exist, the parents form a cycle, or an
- offset is not finite.
+ - `TUMBLE_RESULT_INVALID_ARGUMENT` if a parent is negative but not -1, or there are too many ticks in a second.
+ - `TUMBLE_RESULT_INVALID_INPUT` if there are no joints, a parent does not exist, the parents form a cycle, or an
+   offset is not finite.
 
  # Safety
  `parents` must have `joint_count` numbers; `offsets` must be null or have 3 × `joint_count`; and `library` must
@@ -1807,10 +1826,12 @@ TumbleResult tumble_crowd_library_new(const int32_t *parents,
  (`tumble_crowd_library_set_reference`). `clip` receives the clip's index, counted from 0; it may be null.
 
  # Errors
- `TUMBLE_RESULT_INVALID_INPUT` if the set has not one track for each joint, a track has the name of no joint, a
- track cannot be interpolated as requested, the quantity is not the rotation, a curve rotates so fast that no
- polynomial fits it, the clip is too long, or the library is full; `TUMBLE_RESULT_INVALID_ARGUMENT` if a name is
- unknown. After any error the library is unchanged.
+ - `TUMBLE_RESULT_INVALID_INPUT` if the set has not one track for each joint, a track has the name of no joint, a
+   track cannot be interpolated as requested, the quantity is not the rotation, a curve rotates so fast that no
+   polynomial fits it, the clip is too long, or the library is full.
+ - `TUMBLE_RESULT_INVALID_ARGUMENT` if a name is unknown.
+
+ After any error the library is unchanged.
 
  # Safety
  `interpolation` must be null or point to a `TumbleInterpolation` whose `method` is null or a text that ends with a
@@ -1949,8 +1970,10 @@ TumbleResult tumble_crowd_library_of_file(const struct TumbleFile *file,
  0; it may be null.
 
  # Errors
- `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such clip; `TUMBLE_RESULT_INVALID_INPUT` if its joints or methods do
- not fit, or its rotations are relative to the world; otherwise as `tumble_crowd_library_push`.
+ - `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such clip.
+ - `TUMBLE_RESULT_INVALID_INPUT` if the joints or methods of the clip do not fit, or its rotations are relative to
+   the world.
+ - Otherwise as `tumble_crowd_library_push`.
 
  # Safety
  `interpolation` must be null or point to a `TumbleInterpolation` whose `method` is null or a text that ends with a
@@ -1973,9 +1996,9 @@ TumbleResult tumble_crowd_library_push_clip(struct TumbleCrowdLibrary *library,
  the crowd with `tumble_crowd_free`.
 
  # Errors
- `TUMBLE_RESULT_WRONG_STATE` if the library has no clips; `TUMBLE_RESULT_INVALID_ARGUMENT` if the number of
- instances or layers is out of range; `TUMBLE_RESULT_OUT_OF_MEMORY` or `TUMBLE_RESULT_DEVICE` if there is not
- enough memory or the device fails.
+ - `TUMBLE_RESULT_WRONG_STATE` if the library has no clips.
+ - `TUMBLE_RESULT_INVALID_ARGUMENT` if the number of instances or layers is out of range.
+ - `TUMBLE_RESULT_OUT_OF_MEMORY` or `TUMBLE_RESULT_DEVICE` if there is not enough memory or the device fails.
 
  # Safety
  `crowd` must point to memory for a handle.
@@ -1993,9 +2016,10 @@ TumbleResult tumble_crowd_new(const struct TumbleEngine *engine,
  20 bytes each, reach the device with the next evaluation.
 
  # Errors
- `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such instance, layer, clip or mask; `TUMBLE_RESULT_INVALID_ARGUMENT`
- if another member is invalid. The message has the index of the first change that is refused. After any error
- nothing changes.
+ - `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such instance, layer, clip or mask.
+ - `TUMBLE_RESULT_INVALID_ARGUMENT` if another member is invalid.
+
+ The message has the index of the first change that is refused. After any error nothing changes.
 
  # Safety
  `layers` must have `count` structures.
@@ -2071,8 +2095,10 @@ TumbleResult tumble_crowd_free(struct TumbleCrowd *crowd);
  stay, and its fade ends.
 
  # Errors
- `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such instance or layer; `TUMBLE_RESULT_INVALID_ARGUMENT` if the layer
- is layer 0, or a weight is outside 0 to 1. After any error nothing changes.
+ - `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such instance or layer.
+ - `TUMBLE_RESULT_INVALID_ARGUMENT` if the layer is layer 0, or a weight is outside 0 to 1.
+
+ After any error nothing changes.
  */
 TumbleResult tumble_crowd_set_weight(struct TumbleCrowd *crowd,
                                      size_t instance,
@@ -2087,8 +2113,10 @@ TumbleResult tumble_crowd_set_weight(struct TumbleCrowd *crowd,
  fade.
 
  # Errors
- `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such instance or layer; `TUMBLE_RESULT_INVALID_ARGUMENT` if the layer
- is layer 0, or a weight is outside 0 to 1. After any error nothing changes.
+ - `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such instance or layer.
+ - `TUMBLE_RESULT_INVALID_ARGUMENT` if the layer is layer 0, or a weight is outside 0 to 1.
+
+ After any error nothing changes.
  */
 TumbleResult tumble_crowd_fade(struct TumbleCrowd *crowd,
                                size_t instance,
@@ -2104,8 +2132,10 @@ TumbleResult tumble_crowd_fade(struct TumbleCrowd *crowd,
  weights at all times.
 
  # Errors
- `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such instance or layer; `TUMBLE_RESULT_INVALID_ARGUMENT` if the layer
- is layer 0, or a weight is outside 0 to 1. After any error nothing changes.
+ - `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such instance or layer.
+ - `TUMBLE_RESULT_INVALID_ARGUMENT` if the layer is layer 0, or a weight is outside 0 to 1.
+
+ After any error nothing changes.
 
  # Safety
  `fade` must point to a `TumbleCrowdFade`.
@@ -2139,8 +2169,10 @@ TumbleResult tumble_crowd_get_fade(const struct TumbleCrowd *crowd,
  may be in it twice. It is copied.
 
  # Errors
- `TUMBLE_RESULT_OUT_OF_RANGE` if an instance does not exist; `TUMBLE_RESULT_INVALID_ARGUMENT` if it is in the list
- twice. After any error nothing changes.
+ - `TUMBLE_RESULT_OUT_OF_RANGE` if an instance does not exist.
+ - `TUMBLE_RESULT_INVALID_ARGUMENT` if an instance is in the list twice.
+
+ After any error nothing changes.
 
  # Safety
  `instances` must have `count` numbers.
@@ -2181,9 +2213,10 @@ TumbleResult tumble_crowd_output_count(const struct TumbleCrowd *crowd,
  `tumble_crowd_output_count`.
 
  # Errors
- `TUMBLE_RESULT_WRONG_SIZE` if `output_count` is another number; `TUMBLE_RESULT_WRONG_STATE` if the result of
- `tumble_crowd_submit` was not taken, or skinning matrices are requested but the library has no inverse bind
- matrices; `TUMBLE_RESULT_DEVICE` if the device fails.
+ - `TUMBLE_RESULT_WRONG_SIZE` if `output_count` is another number.
+ - `TUMBLE_RESULT_WRONG_STATE` if the result of `tumble_crowd_submit` was not taken, or skinning matrices are
+   requested but the library has no inverse bind matrices.
+ - `TUMBLE_RESULT_DEVICE` if the device fails.
 
  # Safety
  `output` must have `output_count` floats, which nothing else uses during the call.
@@ -2214,8 +2247,9 @@ TumbleResult tumble_crowd_evaluate_half(struct TumbleCrowd *crowd,
  evaluates or submits again.
 
  # Errors
- `TUMBLE_RESULT_WRONG_STATE` if the result of the previous submission was not taken, or skinning matrices are
- requested but the library has no inverse bind matrices; `TUMBLE_RESULT_DEVICE` if the device fails.
+ - `TUMBLE_RESULT_WRONG_STATE` if the result of the previous submission was not taken, or skinning matrices are
+   requested but the library has no inverse bind matrices.
+ - `TUMBLE_RESULT_DEVICE` if the device fails.
  */
 TumbleResult tumble_crowd_submit(struct TumbleCrowd *crowd,
                                  uint32_t values,
@@ -2225,7 +2259,8 @@ TumbleResult tumble_crowd_submit(struct TumbleCrowd *crowd,
  Returns whether the submitted evaluation has ended, so that `tumble_crowd_wait` does not wait.
 
  # Errors
- `TUMBLE_RESULT_WRONG_STATE` if nothing was submitted; `TUMBLE_RESULT_DEVICE` if the device fails.
+ - `TUMBLE_RESULT_WRONG_STATE` if nothing was submitted.
+ - `TUMBLE_RESULT_DEVICE` if the device fails.
 
  # Safety
  `done` must point to memory for a `bool`.
@@ -2239,9 +2274,11 @@ TumbleResult tumble_crowd_poll(const struct TumbleCrowd *crowd, bool *done);
  submission.
 
  # Errors
- `TUMBLE_RESULT_WRONG_STATE` if nothing was submitted, or `half` was 1; `TUMBLE_RESULT_WRONG_SIZE` if
- `output_count` is another number; after these errors a submitted result can still be taken. `TUMBLE_RESULT_DEVICE`
- if the device fails.
+ - `TUMBLE_RESULT_WRONG_STATE` if nothing was submitted, or `half` was 1.
+ - `TUMBLE_RESULT_WRONG_SIZE` if `output_count` is another number.
+ - `TUMBLE_RESULT_DEVICE` if the device fails.
+
+ After the first two errors, a submitted result can still be taken.
 
  # Safety
  `output` must have `output_count` floats, which nothing else uses during the call.
@@ -2257,9 +2294,11 @@ TumbleResult tumble_crowd_wait(struct TumbleCrowd *crowd,
  time of the submission.
 
  # Errors
- `TUMBLE_RESULT_WRONG_STATE` if nothing was submitted, or `half` was 0; `TUMBLE_RESULT_WRONG_SIZE` if
- `output_count` is another number; after these errors a submitted result can still be taken. `TUMBLE_RESULT_DEVICE`
- if the device fails.
+ - `TUMBLE_RESULT_WRONG_STATE` if nothing was submitted, or `half` was 0.
+ - `TUMBLE_RESULT_WRONG_SIZE` if `output_count` is another number.
+ - `TUMBLE_RESULT_DEVICE` if the device fails.
+
+ After the first two errors, a submitted result can still be taken.
 
  # Safety
  `output` must have `output_count` numbers of 16 bits, which nothing else uses during the call.
@@ -2283,9 +2322,10 @@ TumbleResult tumble_crowd_wait_half(struct TumbleCrowd *crowd,
  destroys the buffer or the device.
 
  # Errors
- `TUMBLE_RESULT_INVALID_ARGUMENT` if the engine was not created by `tumble_engine_from_vulkan`;
- `TUMBLE_RESULT_WRONG_SIZE` if the range is not aligned or too short; `TUMBLE_RESULT_WRONG_STATE` if skinning
- matrices are requested but the library has no inverse bind matrices; `TUMBLE_RESULT_DEVICE` if the device fails.
+ - `TUMBLE_RESULT_INVALID_ARGUMENT` if the engine was not created by `tumble_engine_from_vulkan`.
+ - `TUMBLE_RESULT_WRONG_SIZE` if the range is not aligned or too short.
+ - `TUMBLE_RESULT_WRONG_STATE` if skinning matrices are requested but the library has no inverse bind matrices.
+ - `TUMBLE_RESULT_DEVICE` if the device fails.
 
  # Safety
  The buffer must be as described, and `target` must point to memory for a handle.
@@ -2314,8 +2354,10 @@ TumbleResult tumble_crowd_target_new(const struct TumbleCrowd *crowd,
  at the same time without a lock.
 
  # Errors
- `TUMBLE_RESULT_INVALID_ARGUMENT` if the target belongs to another crowd; `TUMBLE_RESULT_WRONG_SIZE` if more
- instances are visible than it has room for. After any error nothing is recorded.
+ - `TUMBLE_RESULT_INVALID_ARGUMENT` if the target belongs to another crowd.
+ - `TUMBLE_RESULT_WRONG_SIZE` if more instances are visible than the target has room for.
+
+ After any error nothing is recorded.
 
  # Safety
  The command buffer must be as described, nothing else may use it during the call, and its commands must be

@@ -76,8 +76,8 @@ unsafe impl SizedStructure for TumbleEngineOptions {
 /// `tumble_engine_free`.
 ///
 /// # Errors
-/// `TUMBLE_RESULT_DEVICE` if there is no such device, it cannot be opened, or it fails the self-test;
-/// `TUMBLE_RESULT_INVALID_ARGUMENT` if an option is out of its range.
+/// - `TUMBLE_RESULT_DEVICE` if there is no such device, it cannot be opened, or it fails the self-test.
+/// - `TUMBLE_RESULT_INVALID_ARGUMENT` if an option is out of its range.
 ///
 /// # Safety
 /// `device` must be null or a text that ends with a zero byte, `options` must be null or point to a

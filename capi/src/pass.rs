@@ -183,9 +183,10 @@ impl TumblePass {
 /// `TUMBLE_PASS_OPERATION_WORLD`, whose result is a rotation `x y z w` and a position `x y z 0` each.
 ///
 /// # Errors
-/// `TUMBLE_RESULT_INVALID_ARGUMENT` if a constant is unknown, the number of inputs or weights is not the operation's,
-/// or the engine was not created by `tumble_engine_from_vulkan`; `TUMBLE_RESULT_INVALID_POINTER` if an array is null;
-/// `TUMBLE_RESULT_INVALID_INPUT` if the skeleton is refused.
+/// - `TUMBLE_RESULT_INVALID_ARGUMENT` if a constant is unknown, the number of inputs or weights is not the operation's,
+///   or the engine was not created by `tumble_engine_from_vulkan`.
+/// - `TUMBLE_RESULT_INVALID_POINTER` if an array is null.
+/// - `TUMBLE_RESULT_INVALID_INPUT` if the skeleton is refused.
 ///
 /// # Safety
 /// `pass` must point to a `TumblePass` whose pointers are null or as its members say, and `bytes` must point to memory
@@ -217,9 +218,11 @@ pub unsafe extern "C" fn tumble_pass_bytes(
 /// `VK_BUFFER_USAGE_TRANSFER_SRC_BIT` too. This call submits to the engine's queue.
 ///
 /// # Errors
-/// As `tumble_pass_bytes`; also `TUMBLE_RESULT_WRONG_SIZE` if a range is not aligned or too short;
-/// `TUMBLE_RESULT_INVALID_ARGUMENT` if there is no layer, a weight is out of its range, the layout for a skeleton is
-/// track by track, or the result overlaps an input; `TUMBLE_RESULT_DEVICE` if the device fails.
+/// - As `tumble_pass_bytes`.
+/// - `TUMBLE_RESULT_WRONG_SIZE` if a range is not aligned or too short.
+/// - `TUMBLE_RESULT_INVALID_ARGUMENT` if there is no layer, a weight is out of its range, the layout for a skeleton is
+///   track by track, or the result overlaps an input.
+/// - `TUMBLE_RESULT_DEVICE` if the device fails.
 ///
 /// # Safety
 /// `pass` must point to a `TumblePass` whose pointers are null or as its members say; the buffers must be as

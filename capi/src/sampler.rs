@@ -78,7 +78,8 @@ pub unsafe extern "C" fn tumble_sampler_copy(
 /// clip's interpolation. Nothing is allocated.
 ///
 /// # Errors
-/// `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such track; `TUMBLE_RESULT_INVALID_INPUT` if the time is not finite.
+/// - `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such track.
+/// - `TUMBLE_RESULT_INVALID_INPUT` if the time is not finite.
 ///
 /// # Safety
 /// `value` must have four floats, which nothing else uses during the call.
@@ -102,8 +103,8 @@ pub unsafe extern "C" fn tumble_sampler_sample(
 /// `output_count` is the number of floats. Nothing is allocated.
 ///
 /// # Errors
-/// `TUMBLE_RESULT_WRONG_SIZE` if `output_count` is not 4 × tracks; `TUMBLE_RESULT_INVALID_INPUT` if the time is not
-/// finite.
+/// - `TUMBLE_RESULT_WRONG_SIZE` if `output_count` is not 4 × tracks.
+/// - `TUMBLE_RESULT_INVALID_INPUT` if the time is not finite.
 ///
 /// # Safety
 /// `output` must have `output_count` floats, which nothing else uses during the call.
@@ -128,8 +129,9 @@ pub unsafe extern "C" fn tumble_sampler_pose(
 /// `track_count` indices in `tracks`. `output_count` is the number of floats. Nothing is allocated.
 ///
 /// # Errors
-/// `TUMBLE_RESULT_WRONG_SIZE` if `output_count` is not 4 × `track_count`; `TUMBLE_RESULT_OUT_OF_RANGE` if there is no
-/// such track; `TUMBLE_RESULT_INVALID_INPUT` if the time is not finite.
+/// - `TUMBLE_RESULT_WRONG_SIZE` if `output_count` is not 4 × `track_count`.
+/// - `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such track.
+/// - `TUMBLE_RESULT_INVALID_INPUT` if the time is not finite.
 ///
 /// # Safety
 /// `tracks` must have `track_count` numbers, and `output` must have `output_count` floats, which nothing else uses

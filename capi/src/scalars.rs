@@ -86,8 +86,10 @@ pub extern "C" fn tumble_set_scalar_count(set: *const TumbleSet) -> usize {
 /// floats, exactly scalars × samples (`tumble_set_scalar_count`, `tumble_set_sample_count`).
 ///
 /// # Errors
-/// `TUMBLE_RESULT_WRONG_SIZE` if `output_count` is another number; otherwise as `tumble_evaluate`. On an error nothing
-/// is written.
+/// - `TUMBLE_RESULT_WRONG_SIZE` if `output_count` is another number.
+/// - Otherwise as `tumble_evaluate`.
+///
+/// On an error nothing is written.
 ///
 /// # Safety
 /// As `tumble_evaluate`.

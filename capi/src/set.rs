@@ -190,8 +190,9 @@ const _: () = assert!(size_of::<Quat>() == size_of::<[f32; 4]>());
 /// If `buffer` is null, only `length` is written.
 ///
 /// # Errors
-/// `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such track; `TUMBLE_RESULT_WRONG_SIZE` if `buffer` is not null and
-/// `size` is less than the length + 1: then `length` is written, and `buffer` is not.
+/// - `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such track.
+/// - `TUMBLE_RESULT_WRONG_SIZE` if `buffer` is not null and `size` is less than the length + 1: then `length` is
+///   written, and `buffer` is not.
 ///
 /// # Safety
 /// `buffer` must be null or have `size` bytes, and `length` must point to memory for a number.

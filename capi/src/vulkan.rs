@@ -217,9 +217,10 @@ pub(crate) fn buffer_range(
 /// one queue: they take turns.
 ///
 /// # Errors
-/// `TUMBLE_RESULT_INVALID_POINTER` if a required handle or function is null; `TUMBLE_RESULT_INVALID_ARGUMENT` if the
-/// version is below 1.1 or above the loader's, or the physical device or a queue family does not fit;
-/// `TUMBLE_RESULT_DEVICE` if the device fails the self-test.
+/// - `TUMBLE_RESULT_INVALID_POINTER` if a required handle or function is null.
+/// - `TUMBLE_RESULT_INVALID_ARGUMENT` if the version is below 1.1 or above the loader's, or the physical device or a
+///   queue family does not fit.
+/// - `TUMBLE_RESULT_DEVICE` if the device fails the self-test.
 ///
 /// # Safety
 /// `vulkan` must point to a `TumbleVulkan` whose handles are valid, belong together and live as long as described;

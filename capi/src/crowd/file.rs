@@ -111,8 +111,10 @@ fn authored_vector_method(motion: &Motion, clip: usize) -> Result<VectorMethod, 
 /// 0; it may be null.
 ///
 /// # Errors
-/// `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such clip; `TUMBLE_RESULT_INVALID_INPUT` if its joints or methods do
-/// not fit, or its rotations are relative to the world; otherwise as `tumble_crowd_library_push`.
+/// - `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such clip.
+/// - `TUMBLE_RESULT_INVALID_INPUT` if the joints or methods of the clip do not fit, or its rotations are relative to
+///   the world.
+/// - Otherwise as `tumble_crowd_library_push`.
 ///
 /// # Safety
 /// `interpolation` must be null or point to a `TumbleInterpolation` whose `method` is null or a text that ends with a

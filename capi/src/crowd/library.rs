@@ -80,9 +80,9 @@ impl TumbleCrowdLibrary {
 /// `tumble_crowd_library_free`.
 ///
 /// # Errors
-/// `TUMBLE_RESULT_INVALID_ARGUMENT` if a parent is negative but not -1, or there are too many ticks in a second;
-/// `TUMBLE_RESULT_INVALID_INPUT` if there are no joints, a parent does not exist, the parents form a cycle, or an
-/// offset is not finite.
+/// - `TUMBLE_RESULT_INVALID_ARGUMENT` if a parent is negative but not -1, or there are too many ticks in a second.
+/// - `TUMBLE_RESULT_INVALID_INPUT` if there are no joints, a parent does not exist, the parents form a cycle, or an
+///   offset is not finite.
 ///
 /// # Safety
 /// `parents` must have `joint_count` numbers; `offsets` must be null or have 3 × `joint_count`; and `library` must
@@ -144,10 +144,12 @@ pub(crate) unsafe fn vector_method(
 /// (`tumble_crowd_library_set_reference`). `clip` receives the clip's index, counted from 0; it may be null.
 ///
 /// # Errors
-/// `TUMBLE_RESULT_INVALID_INPUT` if the set has not one track for each joint, a track has the name of no joint, a
-/// track cannot be interpolated as requested, the quantity is not the rotation, a curve rotates so fast that no
-/// polynomial fits it, the clip is too long, or the library is full; `TUMBLE_RESULT_INVALID_ARGUMENT` if a name is
-/// unknown. After any error the library is unchanged.
+/// - `TUMBLE_RESULT_INVALID_INPUT` if the set has not one track for each joint, a track has the name of no joint, a
+///   track cannot be interpolated as requested, the quantity is not the rotation, a curve rotates so fast that no
+///   polynomial fits it, the clip is too long, or the library is full.
+/// - `TUMBLE_RESULT_INVALID_ARGUMENT` if a name is unknown.
+///
+/// After any error the library is unchanged.
 ///
 /// # Safety
 /// `interpolation` must be null or point to a `TumbleInterpolation` whose `method` is null or a text that ends with a

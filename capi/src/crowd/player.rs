@@ -43,9 +43,9 @@ impl TumbleCrowd {
 /// the crowd with `tumble_crowd_free`.
 ///
 /// # Errors
-/// `TUMBLE_RESULT_WRONG_STATE` if the library has no clips; `TUMBLE_RESULT_INVALID_ARGUMENT` if the number of
-/// instances or layers is out of range; `TUMBLE_RESULT_OUT_OF_MEMORY` or `TUMBLE_RESULT_DEVICE` if there is not
-/// enough memory or the device fails.
+/// - `TUMBLE_RESULT_WRONG_STATE` if the library has no clips.
+/// - `TUMBLE_RESULT_INVALID_ARGUMENT` if the number of instances or layers is out of range.
+/// - `TUMBLE_RESULT_OUT_OF_MEMORY` or `TUMBLE_RESULT_DEVICE` if there is not enough memory or the device fails.
 ///
 /// # Safety
 /// `crowd` must point to memory for a handle.
@@ -79,9 +79,10 @@ pub unsafe extern "C" fn tumble_crowd_new(
 /// 20 bytes each, reach the device with the next evaluation.
 ///
 /// # Errors
-/// `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such instance, layer, clip or mask; `TUMBLE_RESULT_INVALID_ARGUMENT`
-/// if another member is invalid. The message has the index of the first change that is refused. After any error
-/// nothing changes.
+/// - `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such instance, layer, clip or mask.
+/// - `TUMBLE_RESULT_INVALID_ARGUMENT` if another member is invalid.
+///
+/// The message has the index of the first change that is refused. After any error nothing changes.
 ///
 /// # Safety
 /// `layers` must have `count` structures.

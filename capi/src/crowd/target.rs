@@ -35,9 +35,10 @@ impl Object for TumbleCrowdTarget {
 /// destroys the buffer or the device.
 ///
 /// # Errors
-/// `TUMBLE_RESULT_INVALID_ARGUMENT` if the engine was not created by `tumble_engine_from_vulkan`;
-/// `TUMBLE_RESULT_WRONG_SIZE` if the range is not aligned or too short; `TUMBLE_RESULT_WRONG_STATE` if skinning
-/// matrices are requested but the library has no inverse bind matrices; `TUMBLE_RESULT_DEVICE` if the device fails.
+/// - `TUMBLE_RESULT_INVALID_ARGUMENT` if the engine was not created by `tumble_engine_from_vulkan`.
+/// - `TUMBLE_RESULT_WRONG_SIZE` if the range is not aligned or too short.
+/// - `TUMBLE_RESULT_WRONG_STATE` if skinning matrices are requested but the library has no inverse bind matrices.
+/// - `TUMBLE_RESULT_DEVICE` if the device fails.
 ///
 /// # Safety
 /// The buffer must be as described, and `target` must point to memory for a handle.
@@ -79,8 +80,10 @@ pub unsafe extern "C" fn tumble_crowd_target_new(
 /// at the same time without a lock.
 ///
 /// # Errors
-/// `TUMBLE_RESULT_INVALID_ARGUMENT` if the target belongs to another crowd; `TUMBLE_RESULT_WRONG_SIZE` if more
-/// instances are visible than it has room for. After any error nothing is recorded.
+/// - `TUMBLE_RESULT_INVALID_ARGUMENT` if the target belongs to another crowd.
+/// - `TUMBLE_RESULT_WRONG_SIZE` if more instances are visible than the target has room for.
+///
+/// After any error nothing is recorded.
 ///
 /// # Safety
 /// The command buffer must be as described, nothing else may use it during the call, and its commands must be
