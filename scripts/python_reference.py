@@ -84,8 +84,13 @@ def page():
     values = {name: getattr(tumble, name) for name in sorted(tumble.__all__)}
     functions = {name: value for name, value in values.items() if callable(value) and not inspect.isclass(value)}
     text = HEAD + "\n## Functions\n\n"
+    first_names: dict[int, str] = {}  # of each function, by its identity
     for name, value in functions.items():
-        text += of_function("###", f"tumble.{name}", value)
+        first = first_names.setdefault(id(value), name)
+        if first == name:
+            text += of_function("###", f"tumble.{name}", value)
+        else:
+            text += f"### `tumble.{name}`\n\nThe same function as [`tumble.{first}`](#tumble{first}).\n\n"
     for name, value in values.items():
         if inspect.isclass(value):
             text += of_class(f"tumble.{name}", value)

@@ -18,7 +18,7 @@ pub(crate) const MAX_MASKS: usize = 31;
 pub(crate) const MAX_INSTANCES: usize = 1_000_000;
 /// The maximum number of layers of an instance.
 pub(crate) const MAX_LAYERS: usize = 4;
-/// The maximum length of a clip, ticks.
+/// The maximum length of a clip in ticks.
 pub(crate) const MAX_TICKS: u32 = (1 << 31) - (1 << 18);
 /// Speeds are below this magnitude.
 pub(crate) const FASTEST: f32 = 128.0;
@@ -48,15 +48,15 @@ pub enum CrowdError {
     EventTick {
         /// The tick of the event.
         tick: u32,
-        /// The clip's length, ticks.
+        /// The clip's length in ticks.
         ticks: u32,
     },
     /// Events are asked for after a time that is yet to come.
     #[error("events since {since} ticks, but the clock is at {clock}; give an earlier time")]
     EventsSince {
-        /// The time that was asked for, ticks.
+        /// The requested time in ticks.
         since: u64,
-        /// The time of the clock, ticks.
+        /// The time of the clock in ticks.
         clock: u64,
     },
     /// The library has no clips.
@@ -82,7 +82,7 @@ pub enum CrowdError {
     /// A clip has too many ticks.
     #[error("the clip takes {seconds} s; at {ticks_per_second} ticks a second there can be {} s", f64::from(MAX_TICKS) / f64::from(*ticks_per_second))]
     TooLong {
-        /// The clip's length, seconds.
+        /// The clip's length in seconds.
         seconds: f64,
         /// The library's number of ticks in a second.
         ticks_per_second: u32,
@@ -198,7 +198,7 @@ pub enum CrowdError {
     /// A time is negative, NaN, or too large.
     #[error("{seconds} s; times and steps of a crowd are finite, and within 2^52 ticks")]
     Seconds {
-        /// The time, seconds.
+        /// The time in seconds.
         seconds: f64,
     },
     /// The output is not exactly as long as the result.
@@ -252,11 +252,11 @@ pub enum CrowdError {
         OFFSET_STEP
     )]
     Buffer {
-        /// The start of the range, bytes.
+        /// The start of the range in bytes.
         offset: u64,
-        /// The length of the range, bytes.
+        /// The length of the range in bytes.
         size: u64,
-        /// The length of the result, bytes.
+        /// The length of the result in bytes.
         needed: u64,
     },
     /// The Vulkan device cannot be used, or failed. After a lost device, make the crowd again.

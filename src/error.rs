@@ -22,7 +22,7 @@ use crate::tracks::per_track::PerTrackCountError;
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// The sample times do not fit the set.
+    /// The sample times do not fit the set ([`SampleTimes::resolve`](crate::SampleTimes::resolve)).
     #[error(transparent)]
     SampleTimes(#[from] SampleTimesError),
     /// A track cannot be interpolated as requested.
@@ -62,9 +62,9 @@ pub enum Error {
     /// The output of an encoded result is not exactly as long as the result.
     #[error("the output has {length} bytes; the result has {needed}")]
     OutputBytes {
-        /// The length of the output, bytes.
+        /// The length of the output in bytes.
         length: usize,
-        /// The length of the result, bytes.
+        /// The length of the result in bytes.
         needed: usize,
     },
     /// The requested tracks or samples are out of range.

@@ -34,9 +34,9 @@
 //!
 //! # Topics
 //!
-//! * **Results larger than memory**: [`Request::stream`] returns one chunk while the next one is evaluated.
-//!   [`Clip::request`] and [`Engine::request`] evaluate some samples of some tracks, in an encoding, into the
-//!   caller's memory. [`OutputBuffer`] is memory that is fast to fill.
+//! * **Results larger than memory**: [`Request::stream`] passes one chunk to your closure while the next one is
+//!   evaluated. [`Clip::request`] and [`Engine::request`] evaluate some samples of some tracks, in an encoding, into
+//!   the caller's memory. [`OutputBuffer`] is memory that is fast to fill.
 //! * **One pose at a time**, such as in a game's loop: [`Clip::sampler`] gives a [`Sampler`], which evaluates single
 //!   samples and poses on the calling thread and allocates nothing.
 //! * **Skeletons**: [`Engine::transforms`] evaluates translations, rotations and scales, and
@@ -44,9 +44,10 @@
 //!   bind matrices. [`Engine::world`] does this for rotations at fixed offsets. [`Engine::blend`], [`Engine::mix`]
 //!   and [`Engine::add`] combine layers of poses.
 //! * **Crowds**: in [`crowd`], a [`CrowdLibrary`](crowd::CrowdLibrary) has the clips of a skeleton, and a
-//!   [`Crowd`](crowd::Crowd) plays them: many instances, each at its time, with layers, evaluated to matrices for
-//!   skinning. Without a skeleton, many characters at different times in one [`Clip`] are one call with
-//!   [`SampleTimes::at`], a sample for each, in [`Layout::FrameMajor`]; list the times in increasing order.
+//!   [`Crowd`](crowd::Crowd) plays them: many instances, each at its own time, with layers, evaluated to matrices for
+//!   skinning. For many characters that play the same [`Clip`] at different times, without a skeleton, evaluate the
+//!   clip once: pass their times in increasing order to [`SampleTimes::at`]. In [`Layout::FrameMajor`], each row of the
+//!   result is one character.
 //! * **An application's Vulkan device** ([`vulkan`]): [`Engine::from_vulkan`] takes a renderer's device and a queue.
 //!   [`Crowd::record`](crowd::Crowd::record) records a crowd's poses into its command buffers. [`Request::target`]
 //!   and [`Request::to_buffer`] write a clip's results to the renderer's buffer, where [`Engine::pass`] blends them

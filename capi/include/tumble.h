@@ -225,7 +225,7 @@ typedef uint32_t TumbleWrap;
 #endif // __cplusplus
 
 /*
- The boundary condition: the curve in the first and in the last segment, where a neighbouring key is missing.
+ The boundary condition: the curve in the first and in the last interval, where a neighbouring key is missing.
  */
 enum TumbleEnds
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -257,7 +257,7 @@ enum TumbleEnds
    */
   TUMBLE_ENDS_LOOP = 5,
   /*
-   The first and the last segment are constant, with the value of their first key.
+   The first and the last interval are constant, with the value of the first key of each.
    */
   TUMBLE_ENDS_FROZEN = 6,
 };
@@ -282,19 +282,19 @@ enum TumbleQuantity
    */
   TUMBLE_QUANTITY_ROTATION = 0,
   /*
-   The angular velocity in the axes of the rotating body, rad/s: `x y z 0`.
+   The angular velocity in the axes of the rotating body in rad/s: `x y z 0`.
    */
   TUMBLE_QUANTITY_VELOCITY_IN_BODY = 1,
   /*
-   The angular velocity in the axes of the parent, rad/s: `x y z 0`.
+   The angular velocity in the axes of the parent in rad/s: `x y z 0`.
    */
   TUMBLE_QUANTITY_VELOCITY_IN_PARENT = 2,
   /*
-   The angular acceleration in the axes of the rotating body, rad/s²: `x y z 0`.
+   The angular acceleration in the axes of the rotating body in rad/s²: `x y z 0`.
    */
   TUMBLE_QUANTITY_ACCELERATION_IN_BODY = 3,
   /*
-   The angular acceleration in the axes of the parent, rad/s²: `x y z 0`.
+   The angular acceleration in the axes of the parent in rad/s²: `x y z 0`.
    */
   TUMBLE_QUANTITY_ACCELERATION_IN_PARENT = 4,
 };
@@ -512,8 +512,8 @@ typedef struct TumblePassTarget TumblePassTarget;
 
 /*
  A sampler: it evaluates a clip at one time after another, on the calling thread, for programs that need a pose now.
- It is fastest if most times are near the one before. Threads may share a sampler, but wait for each other; give each
- its own (`tumble_sampler_copy`).
+ Sampling is fastest if most times are near the time before. Threads that share a sampler wait for each other; give
+ each thread its own (`tumble_sampler_copy`).
  */
 typedef struct TumbleSampler TumbleSampler;
 
@@ -532,7 +532,7 @@ typedef struct TumbleEngineOptions {
    */
   size_t size;
   /*
-   The limit of memory, bytes: on a Vulkan device for everything except results, on the CPU for the segments of a
+   The limit of memory in bytes: on a Vulkan device for everything except results, on the CPU for the segments of a
    set. Larger sets are prepared piece by piece. 0: no limit.
    */
   uint64_t memory;
@@ -573,19 +573,19 @@ typedef struct TumbleSamples {
    */
   uint64_t rate_frames;
   /*
-   The denominator of the frame rate, seconds; 0 means 1.
+   The denominator of the frame rate: a number of seconds; 0 means 1.
    */
   uint64_t rate_seconds;
   /*
-   The time of the first frame, seconds, for `TUMBLE_SAMPLING_RANGE`.
+   The time of the first frame in seconds, for `TUMBLE_SAMPLING_RANGE`.
    */
   double start;
   /*
-   The time after which there are no frames, seconds, for `TUMBLE_SAMPLING_RANGE`; not before `start`.
+   The time in seconds after which there are no frames, for `TUMBLE_SAMPLING_RANGE`; not before `start`.
    */
   double end;
   /*
-   The sample times, seconds, for `TUMBLE_SAMPLING_TIMES` and `TUMBLE_SAMPLING_TIMES_OF_TRACKS`. They are copied
+   The sample times in seconds, for `TUMBLE_SAMPLING_TIMES` and `TUMBLE_SAMPLING_TIMES_OF_TRACKS`. They are copied
    during the call.
    */
   const double *times;
@@ -646,8 +646,8 @@ typedef struct TumbleInterpolation {
    */
   double tension;
   /*
-   The continuity of "kochanek-bartels", likewise. With -1 the curve has a corner at a key, with 1 a corner to
-   the other side.
+   The continuity of "kochanek-bartels", likewise. With -1 the curve has a corner at a key; with 1 the corner
+   points the other way, because the curve swings out beyond the key before and after it.
    */
   double continuity;
   /*
@@ -715,11 +715,11 @@ typedef struct TumbleBufferRange {
    */
   uint64_t buffer;
   /*
-   The start of the range, bytes.
+   The start of the range in bytes.
    */
   uint64_t offset;
   /*
-   The length of the range, bytes.
+   The length of the range in bytes.
    */
   uint64_t size;
 } TumbleBufferRange;
@@ -750,9 +750,10 @@ typedef struct TumblePass {
    */
   size_t sample_count;
   /*
-   The inputs, as the operation says. Each range starts at a multiple of 256, the layers of a blend at multiples
-   of 16, and has at least 16 × `track_count` × `sample_count` bytes. Layers that are contiguous in one buffer,
-   from a multiple of 256 on, are read directly; others are first copied into one buffer.
+   The inputs, as the operation says. Each range has at least 16 × `track_count` × `sample_count` bytes. For
+   `TUMBLE_PASS_OPERATION_BLEND`, each range must start at a multiple of 16; for other operations, at a multiple of
+   256. Layers of a blend that follow each other in one buffer, the first at a multiple of 256, are read directly;
+   others are first copied into one buffer.
    */
   const struct TumbleBufferRange *inputs;
   /*
@@ -841,11 +842,11 @@ typedef struct TumbleVulkan {
    */
   uint32_t copy_queue_family;
   /*
-   A function that locks `queue`, or null. The library calls it with `queue_user` before each submission to
-   `queue`, on any thread, and `unlock_queue` after it. The application must use the same lock for `queue`, and
-   must not have it locked when it calls the library, which would wait forever. If `lock_queue` is null,
-   `unlock_queue` must be null too, and the application must not use `queue` during a call that submits to it.
-   Several engines on one queue need no lock among themselves.
+   A function that locks `queue`, or null. The library calls this function with `queue_user` before each submission
+   to `queue`, on any thread, and `unlock_queue` after the submission. The application must use the same lock for
+   `queue`, and must not hold the lock when it calls the library, which would wait forever. If `lock_queue` is
+   null, `unlock_queue` must be null too, and the application must not use `queue` during a call that submits to
+   it. Several engines on one queue need no lock among themselves.
    */
   void (*lock_queue)(void *user);
   /*
@@ -853,15 +854,15 @@ typedef struct TumbleVulkan {
    */
   void (*unlock_queue)(void *user);
   /*
-   The argument of both functions. It must stay valid until the engine and all objects that were made with it are
-   freed.
+   The argument of `lock_queue` and `unlock_queue`. It must stay valid until the engine and all objects that were
+   made with it are freed.
    */
   void *queue_user;
   /*
    The application's `VkPipelineCache`, in which the library makes its pipelines, or 0 (`VK_NULL_HANDLE`). It must
    not be synchronized externally, and must stay valid until the engine and all objects that were made with it are
-   freed. The library neither reads it from a file nor writes it to one. 0: the library makes a cache and keeps it
-   in a file (`TumbleEngineOptions.cache_directory`).
+   freed. The library neither reads this cache from a file nor writes it to one. 0: the library makes a cache and
+   keeps it in a file (`TumbleEngineOptions.cache_directory`).
    */
   uint64_t pipeline_cache;
 } TumbleVulkan;
@@ -888,7 +889,7 @@ typedef struct TumbleCrowdLayer {
    */
   size_t clip;
   /*
-   The layer's current time in the clip, ticks. Outside the clip `wrap` applies.
+   The layer's current time in ticks of the clip. Outside the clip `wrap` applies.
    */
   int64_t time;
   /*
@@ -934,11 +935,11 @@ typedef struct TumbleCrowdFade {
    */
   size_t layer;
   /*
-   The clock's time at which the fade starts, ticks; in the past or in the future.
+   The clock's time in ticks at which the fade starts; in the past or in the future.
    */
   uint64_t start;
   /*
-   The duration of the fade, ticks; with 0 the weight changes at once.
+   The duration of the fade in ticks; with 0 the weight changes at once.
    */
   uint64_t ticks;
   /*
@@ -984,8 +985,8 @@ const char *tumble_last_error(void);
  `tumble_engine_free`.
 
  # Errors
- `TUMBLE_RESULT_DEVICE` if there is no such device, it cannot be opened, or it fails the self-test;
- `TUMBLE_RESULT_INVALID_ARGUMENT` if an option is out of its range.
+ - `TUMBLE_RESULT_DEVICE` if there is no such device, it cannot be opened, or it fails the self-test.
+ - `TUMBLE_RESULT_INVALID_ARGUMENT` if an option is out of its range.
 
  # Safety
  `device` must be null or a text that ends with a zero byte, `options` must be null or point to a
@@ -1066,8 +1067,8 @@ size_t tumble_set_key_count(const struct TumbleSet *set);
 /*
  Returns pointers to the key times and the rotation keys of the track `index`, counted from 0.
 
- `times` receives a pointer to `key_count` numbers in seconds, and `keys` a pointer to 4 × `key_count` numbers,
- `x y z w` for each key. The arrays belong to the set: they stay valid until a track is pushed to it or it is
+ `times` receives a pointer to `key_count` numbers in seconds, and `keys` a pointer to 4 × `key_count` numbers, `x y
+ z w` for each key. The arrays belong to the set and stay valid until a track is pushed to the set, or the set is
  freed.
 
  # Errors
@@ -1090,8 +1091,9 @@ TumbleResult tumble_set_track(const struct TumbleSet *set,
  If `buffer` is null, only `length` is written.
 
  # Errors
- `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such track; `TUMBLE_RESULT_WRONG_SIZE` if `buffer` is not null and
- `size` is less than the length + 1: then `length` is written, and `buffer` is not.
+ - `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such track.
+ - `TUMBLE_RESULT_WRONG_SIZE` if `buffer` is not null and `size` is less than the length + 1: then `length` is
+   written, and `buffer` is not.
 
  # Safety
  `buffer` must be null or have `size` bytes, and `length` must point to memory for a number.
@@ -1103,7 +1105,7 @@ TumbleResult tumble_set_track_name(const struct TumbleSet *set,
                                    size_t *length);
 
 /*
- Returns the first and the last key time of all tracks, seconds; key times of translations and scales count too.
+ Returns the first and the last key time of all tracks in seconds; key times of translations and scales count too.
 
  # Errors
  `TUMBLE_RESULT_OUT_OF_RANGE` if the set has no tracks.
@@ -1258,9 +1260,11 @@ TumbleResult tumble_set_sample_count(const struct TumbleSet *set,
  copy.
 
  # Errors
- `TUMBLE_RESULT_WRONG_SIZE` if `output_count` is another number; `TUMBLE_RESULT_INVALID_INPUT` if the sample times
- are invalid, or a track cannot be interpolated as requested; `TUMBLE_RESULT_DEVICE` if the device fails. All
- arguments are checked before anything is written.
+ - `TUMBLE_RESULT_WRONG_SIZE` if `output_count` is another number.
+ - `TUMBLE_RESULT_INVALID_INPUT` if the sample times are invalid, or a track cannot be interpolated as requested.
+ - `TUMBLE_RESULT_DEVICE` if the device fails.
+
+ All arguments are checked before anything is written.
 
  # Safety
  `interpolation` must be null or point to a `TumbleInterpolation` whose `method` is null or a text that ends with a
@@ -1282,8 +1286,8 @@ TumbleResult tumble_evaluate(const struct TumbleEngine *engine,
  before it. The caller frees the clip with `tumble_clip_free`.
 
  # Errors
- `TUMBLE_RESULT_INVALID_INPUT` if a track cannot be interpolated as requested; `TUMBLE_RESULT_OUT_OF_MEMORY` or
- `TUMBLE_RESULT_DEVICE` if the device lacks memory or fails.
+ - `TUMBLE_RESULT_INVALID_INPUT` if a track cannot be interpolated as requested.
+ - `TUMBLE_RESULT_OUT_OF_MEMORY` or `TUMBLE_RESULT_DEVICE` if the device lacks memory or fails.
 
  # Safety
  `interpolation` must be null or point to a `TumbleInterpolation` whose `method` is null or a text that ends with a
@@ -1295,9 +1299,10 @@ TumbleResult tumble_upload(const struct TumbleEngine *engine,
                            struct TumbleClip **clip);
 
 /*
- Returns the memory that a clip takes on the host for each key, bytes: 16 and more of a clip that keeps its keys,
- 64, or 144 to 208, and more of one that keeps segments. On the CPU, large clips whose samples can be computed from
- their keys keep these.
+ Returns the memory that a clip takes on the host for each key, in bytes: 16 or more if the clip keeps its keys; if
+ the clip keeps segments, 64 or more for arcs (slerp), and 144 to 208 or more for polynomials. On the CPU, a clip
+ whose segments would exceed the limit `memory` of `TumbleEngineOptions` keeps its keys instead, if samples can be
+ computed from them.
 
  # Safety
  `bytes` must point to memory for a number.
@@ -1345,8 +1350,9 @@ TumbleResult tumble_clip_evaluate(const struct TumbleClip *clip,
  returns when the result is written. Commands that are submitted to the queue afterwards see it.
 
  # Errors
- `TUMBLE_RESULT_INVALID_ARGUMENT` if the engine was not created by `tumble_engine_from_vulkan`;
- `TUMBLE_RESULT_WRONG_SIZE` if the range is not aligned or too short; otherwise as `tumble_evaluate`.
+ - `TUMBLE_RESULT_INVALID_ARGUMENT` if the engine was not created by `tumble_engine_from_vulkan`.
+ - `TUMBLE_RESULT_WRONG_SIZE` if the range is not aligned or too short.
+ - Otherwise as `tumble_evaluate`.
 
  # Safety
  `samples` must point to a `TumbleSamples` whose `times` has `time_count` numbers. The buffer must be as described,
@@ -1370,7 +1376,8 @@ TumbleResult tumble_clip_free(struct TumbleClip *clip);
  The clip may be freed before the sampler. The caller frees the sampler with `tumble_sampler_free`.
 
  # Errors
- `TUMBLE_RESULT_OUT_OF_MEMORY` if the clip exceeds its engine's memory limit, so that its segments are not kept.
+ `TUMBLE_RESULT_OUT_OF_MEMORY` if the segments of the clip exceed its engine's memory limit, and samples cannot be
+ computed from its keys within the limit.
 
  # Safety
  `sampler` must point to memory for a handle.
@@ -1389,11 +1396,12 @@ TumbleResult tumble_sampler_copy(const struct TumbleSampler *sampler,
                                  struct TumbleSampler **copy);
 
 /*
- Evaluates one track at a time, seconds. `value` receives four floats, according to the quantity of the clip's
- interpolation. Nothing is allocated.
+ Evaluates one track at `time`, which is in seconds. `value` receives four floats, according to the quantity of the
+ clip's interpolation. Nothing is allocated.
 
  # Errors
- `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such track; `TUMBLE_RESULT_INVALID_INPUT` if the time is not finite.
+ - `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such track.
+ - `TUMBLE_RESULT_INVALID_INPUT` if the time is not finite.
 
  # Safety
  `value` must have four floats, which nothing else uses during the call.
@@ -1404,12 +1412,12 @@ TumbleResult tumble_sampler_sample(const struct TumbleSampler *sampler,
                                    float *value);
 
 /*
- Evaluates every track at a time, seconds, into the caller's memory: four floats for each track. `output_count` is the
- number of floats. Nothing is allocated.
+ Evaluates every track at `time`, which is in seconds, into the caller's memory: four floats for each track.
+ `output_count` is the number of floats. Nothing is allocated.
 
  # Errors
- `TUMBLE_RESULT_WRONG_SIZE` if `output_count` is not 4 × tracks; `TUMBLE_RESULT_INVALID_INPUT` if the time is not
- finite.
+ - `TUMBLE_RESULT_WRONG_SIZE` if `output_count` is not 4 × tracks.
+ - `TUMBLE_RESULT_INVALID_INPUT` if the time is not finite.
 
  # Safety
  `output` must have `output_count` floats, which nothing else uses during the call.
@@ -1420,12 +1428,13 @@ TumbleResult tumble_sampler_pose(const struct TumbleSampler *sampler,
                                  size_t output_count);
 
 /*
- Evaluates some tracks at a time, seconds, into the caller's memory: four floats for each of the `track_count` indices
- in `tracks`. `output_count` is the number of floats. Nothing is allocated.
+ Evaluates some tracks at `time`, which is in seconds, into the caller's memory: four floats for each of the
+ `track_count` indices in `tracks`. `output_count` is the number of floats. Nothing is allocated.
 
  # Errors
- `TUMBLE_RESULT_WRONG_SIZE` if `output_count` is not 4 × `track_count`; `TUMBLE_RESULT_OUT_OF_RANGE` if there is no
- such track; `TUMBLE_RESULT_INVALID_INPUT` if the time is not finite.
+ - `TUMBLE_RESULT_WRONG_SIZE` if `output_count` is not 4 × `track_count`.
+ - `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such track.
+ - `TUMBLE_RESULT_INVALID_INPUT` if the time is not finite.
 
  # Safety
  `tracks` must have `track_count` numbers, and `output` must have `output_count` floats, which nothing else uses
@@ -1444,11 +1453,12 @@ TumbleResult tumble_sampler_pose_of(const struct TumbleSampler *sampler,
 TumbleResult tumble_sampler_free(struct TumbleSampler *sampler);
 
 /*
- Appends a scalar of `key_count` keys, at least one, to a set. A set may have scalars without tracks.
+ Appends a scalar to a set: a number that changes over time, such as the angle of a hinge or a weight, with
+ `key_count` keys, at least one. A set may have scalars without tracks.
 
- `name` is its name in UTF-8. `times` are the key times in seconds, strictly
- increasing, and `keys` a number for each. `tangents` are for the method "gltf-cubic" and may be null: two numbers
- for each time, the incoming tangent and the outgoing one, in units per second. Arrays and name are copied.
+ `name` is the scalar's name in UTF-8. `times` are the key times in seconds, strictly increasing, and `keys` a number
+ for each. `tangents` are for the method "gltf-cubic" and may be null: two numbers for each time, the incoming
+ tangent and the outgoing one, in units per second. Arrays and name are copied.
 
  # Errors
  `TUMBLE_RESULT_INVALID_INPUT` if there are no keys, the times are not finite and strictly increasing, or a number
@@ -1473,15 +1483,17 @@ size_t tumble_set_scalar_count(const struct TumbleSet *set);
 /*
  Evaluates the scalars of a set, or how fast they change, into the caller's memory, and waits for the result.
 
- `interpolation` may be null for the defaults. Scalars are interpolated as translations are by its method
- (docs/methods.md): by "slerp" along lines, by "bessel-overhauser" with continuous velocities. Its ends and wraps
- apply; its quantity does not. `quantity` is a `TumbleScalarQuantity`, `layout` a `TumbleLayout`. `output` receives a
- float for each sample of each scalar. `output_count` is the number of floats, exactly scalars × samples
- (`tumble_set_scalar_count`, `tumble_set_sample_count`).
+ `interpolation` may be null for the defaults. The method of `interpolation` determines how scalars are interpolated,
+ as it does for translations (docs/methods.md): "slerp" along lines, "bessel-overhauser" with continuous velocities.
+ The ends and wraps of `interpolation` apply; its quantity is ignored. `quantity` is a `TumbleScalarQuantity`,
+ `layout` a `TumbleLayout`. `output` receives a float for each sample of each scalar. `output_count` is the number of
+ floats, exactly scalars × samples (`tumble_set_scalar_count`, `tumble_set_sample_count`).
 
  # Errors
- `TUMBLE_RESULT_WRONG_SIZE` if `output_count` is another number; otherwise as `tumble_evaluate`. On an error nothing
- is written.
+ - `TUMBLE_RESULT_WRONG_SIZE` if `output_count` is another number.
+ - Otherwise as `tumble_evaluate`.
+
+ On an error nothing is written.
 
  # Safety
  As `tumble_evaluate`.
@@ -1510,9 +1522,10 @@ const char *tumble_encoding_name(size_t index);
  Returns the size of a request's result in bytes.
 
  # Errors
- `TUMBLE_RESULT_INVALID_ARGUMENT` if a constant or a name is unknown; `TUMBLE_RESULT_OUT_OF_RANGE` if the clip does
- not have these tracks or samples; `TUMBLE_RESULT_INVALID_INPUT` if the sample times are invalid, or the encoding
- is for rotations and the clip's quantity is a velocity or an acceleration.
+ - `TUMBLE_RESULT_INVALID_ARGUMENT` if a constant or a name is unknown.
+ - `TUMBLE_RESULT_OUT_OF_RANGE` if the clip does not have these tracks or samples.
+ - `TUMBLE_RESULT_INVALID_INPUT` if the sample times are invalid, or the encoding is for rotations and the clip's
+   quantity is a velocity or an acceleration.
 
  # Safety
  `request` must point to a `TumbleRequest` whose pointers are null or as its members say, and `bytes` must point to
@@ -1529,8 +1542,11 @@ TumbleResult tumble_request_bytes(const struct TumbleClip *clip,
  `tumble_request_bytes`. Memory that is aligned to 16 bytes is filled without a copy.
 
  # Errors
- As `tumble_request_bytes`; also `TUMBLE_RESULT_WRONG_SIZE` if `output_bytes` is another number, and
- `TUMBLE_RESULT_DEVICE` if the device fails. All arguments are checked before anything is written.
+ - As `tumble_request_bytes`.
+ - `TUMBLE_RESULT_WRONG_SIZE` if `output_bytes` is another number.
+ - `TUMBLE_RESULT_DEVICE` if the device fails.
+
+ All arguments are checked before anything is written.
 
  # Safety
  `request` must point to a `TumbleRequest` whose pointers are null or as its members say, and `output` must have
@@ -1545,17 +1561,18 @@ TumbleResult tumble_request_evaluate(const struct TumbleClip *clip,
  Prepares the recording of a request of a clip, whose result goes to a range of the application's Vulkan buffer.
 
  Kernels are compiled and work lists are uploaded here, not when a frame is recorded. The clip's engine must have
- been created by `tumble_engine_from_vulkan`; this call submits to its queue. `buffer` is the `VkBuffer`, as a
- number: `(uint64_t)buffer`. The range starts at `offset`, a multiple of the bytes of a value (16 for "f32"), and
- has `size` bytes, at least those of `tumble_request_bytes`. The buffer must belong to the engine's device, be
- bound to memory, and have the usages `VK_BUFFER_USAGE_STORAGE_BUFFER_BIT` and `VK_BUFFER_USAGE_TRANSFER_DST_BIT`.
+ been created by `tumble_engine_from_vulkan`. This call submits to the engine's queue. `buffer` is the `VkBuffer`, as
+ a number: `(uint64_t)buffer`. The range starts at `offset`, a multiple of the bytes of a value (16 for "f32"), and
+ has `size` bytes, at least those of `tumble_request_bytes`. The buffer must belong to the engine's device, be bound
+ to memory, and have the usages `VK_BUFFER_USAGE_STORAGE_BUFFER_BIT` and `VK_BUFFER_USAGE_TRANSFER_DST_BIT`.
 
- The target needs neither the clip nor the engine afterwards. The application frees it with
+ The target needs neither the clip nor the engine afterwards. The application frees the target with
  `tumble_clip_target_free` before it destroys the buffer or the device.
 
  # Errors
- As `tumble_request_bytes`; also `TUMBLE_RESULT_INVALID_ARGUMENT` if the engine was not created by
- `tumble_engine_from_vulkan`, and `TUMBLE_RESULT_WRONG_SIZE` if the range is not aligned or too short.
+ - As `tumble_request_bytes`.
+ - `TUMBLE_RESULT_INVALID_ARGUMENT` if the engine was not created by `tumble_engine_from_vulkan`.
+ - `TUMBLE_RESULT_WRONG_SIZE` if the range is not aligned or too short.
 
  # Safety
  `request` must point to a `TumbleRequest` whose pointers are null or as its members say; the buffer must be as
@@ -1602,9 +1619,10 @@ TumbleResult tumble_clip_target_free(struct TumbleClipTarget *target);
  `TUMBLE_PASS_OPERATION_WORLD`, whose result is a rotation `x y z w` and a position `x y z 0` each.
 
  # Errors
- `TUMBLE_RESULT_INVALID_ARGUMENT` if a constant is unknown, the number of inputs or weights is not the operation's,
- or the engine was not created by `tumble_engine_from_vulkan`; `TUMBLE_RESULT_INVALID_POINTER` if an array is null;
- `TUMBLE_RESULT_INVALID_INPUT` if the skeleton is refused.
+ - `TUMBLE_RESULT_INVALID_ARGUMENT` if a constant is unknown, the number of inputs or weights is not the operation's,
+   or the engine was not created by `tumble_engine_from_vulkan`.
+ - `TUMBLE_RESULT_INVALID_POINTER` if an array is null.
+ - `TUMBLE_RESULT_INVALID_INPUT` if the skeleton is refused.
 
  # Safety
  `pass` must point to a `TumblePass` whose pointers are null or as its members say, and `bytes` must point to memory
@@ -1615,8 +1633,8 @@ TumbleResult tumble_pass_bytes(const struct TumbleEngine *engine,
                                uint64_t *bytes);
 
 /*
- Runs a pass with its result in a range of a buffer, and waits for it. Commands that are submitted to the engine's
- queue afterwards see the result; the inputs may be written by commands that were submitted there before.
+ Runs a pass whose result goes to a range of a buffer, and waits for the result. Commands that are submitted to the
+ engine's queue afterwards see the result; the inputs may be written by commands that were submitted there before.
 
  The range starts at a multiple of 256, has at least the bytes of `tumble_pass_bytes`, and does not overlap an
  input. All buffers must belong to the engine's device, be bound to memory, and have the usage
@@ -1624,9 +1642,11 @@ TumbleResult tumble_pass_bytes(const struct TumbleEngine *engine,
  `VK_BUFFER_USAGE_TRANSFER_SRC_BIT` too. This call submits to the engine's queue.
 
  # Errors
- As `tumble_pass_bytes`; also `TUMBLE_RESULT_WRONG_SIZE` if a range is not aligned or too short;
- `TUMBLE_RESULT_INVALID_ARGUMENT` if there is no layer, a weight is out of its range, the layout for a skeleton is
- track by track, or the result overlaps an input; `TUMBLE_RESULT_DEVICE` if the device fails.
+ - As `tumble_pass_bytes`.
+ - `TUMBLE_RESULT_WRONG_SIZE` if a range is not aligned or too short.
+ - `TUMBLE_RESULT_INVALID_ARGUMENT` if there is no layer, a weight is out of its range, the layout for a skeleton is
+   track by track, or the result overlaps an input.
+ - `TUMBLE_RESULT_DEVICE` if the device fails.
 
  # Safety
  `pass` must point to a `TumblePass` whose pointers are null or as its members say; the buffers must be as
@@ -1641,10 +1661,10 @@ TumbleResult tumble_pass_to_buffer(const struct TumbleEngine *engine,
 /*
  Prepares the recording of a pass, whose result goes to a range of the application's Vulkan buffer.
 
- The kernel is compiled and memory is allocated here, not when a frame is recorded; this call submits to the
- engine's queue when it checks a new kernel. The buffers must be as `tumble_pass_to_buffer` says. The target does
- not need the engine afterwards. The application frees it with `tumble_pass_target_free` before it destroys a buffer
- or the device.
+ The kernel is compiled and memory is allocated here, not when a frame is recorded. If the kernel was not checked
+ before, this call checks it, and then submits to the engine's queue. The buffers must be as `tumble_pass_to_buffer`
+ says. The target does not need the engine afterwards. The application frees the target with
+ `tumble_pass_target_free` before it destroys a buffer or the device.
 
  # Errors
  As `tumble_pass_to_buffer`.
@@ -1709,9 +1729,11 @@ TumbleResult tumble_pass_target_free(struct TumblePassTarget *target);
  arrays are copied.
 
  # Errors
- `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such track; `TUMBLE_RESULT_INVALID_INPUT` if the times are not finite
- and strictly increasing, or a number is not finite or exceeds 1e30 in magnitude. After any error the set is
- unchanged.
+ - `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such track.
+ - `TUMBLE_RESULT_INVALID_INPUT` if the times are not finite and strictly increasing, or a number is not finite or
+   exceeds 1e30 in magnitude.
+
+ After any error the set is unchanged.
 
  # Safety
  `times` must have `key_count` numbers and `keys` 3 × `key_count`; `tangents` must be null or have 6 × `key_count`.
@@ -1754,9 +1776,10 @@ TumbleResult tumble_set_scales(struct TumbleSet *set,
  one queue: they take turns.
 
  # Errors
- `TUMBLE_RESULT_INVALID_POINTER` if a required handle or function is null; `TUMBLE_RESULT_INVALID_ARGUMENT` if the
- version is below 1.1 or above the loader's, or the physical device or a queue family does not fit;
- `TUMBLE_RESULT_DEVICE` if the device fails the self-test.
+ - `TUMBLE_RESULT_INVALID_POINTER` if a required handle or function is null.
+ - `TUMBLE_RESULT_INVALID_ARGUMENT` if the version is below 1.1 or above the loader's, or the physical device or a
+   queue family does not fit.
+ - `TUMBLE_RESULT_DEVICE` if the device fails the self-test.
 
  # Safety
  `vulkan` must point to a `TumbleVulkan` whose handles are valid, belong together and live as long as described;
@@ -1770,15 +1793,15 @@ TumbleResult tumble_engine_from_vulkan(const struct TumbleVulkan *vulkan,
  Creates an empty library for a skeleton of `joint_count` joints.
 
  `parents` are the indices of the joints' parents, -1 for a root; parents may come after their children. `offsets`
- are three numbers `x y z` for each joint: its position in the parent's frame in clips that have no translations
- for it. Null: all are 0. `ticks_per_second` is the number of ticks in a second, 0 for 705 600. A clip has up to
- 2 147 221 504 ticks, which are 50 minutes by default. The arrays are copied. The caller frees the library with
+ are three numbers `x y z` for each joint: the position in the parent's frame, for clips without translations of the
+ joint. Null: all are 0. `ticks_per_second` is the number of ticks in a second, 0 for 705 600. A clip has up to 2 147
+ 221 504 ticks, which are 50 minutes by default. The arrays are copied. The caller frees the library with
  `tumble_crowd_library_free`.
 
  # Errors
- `TUMBLE_RESULT_INVALID_ARGUMENT` if a parent is negative but not -1, or there are too many ticks in a second;
- `TUMBLE_RESULT_INVALID_INPUT` if there are no joints, a parent does not exist, the parents form a cycle, or an
- offset is not finite.
+ - `TUMBLE_RESULT_INVALID_ARGUMENT` if a parent is negative but not -1, or there are too many ticks in a second.
+ - `TUMBLE_RESULT_INVALID_INPUT` if there are no joints, a parent does not exist, the parents form a cycle, or an
+   offset is not finite.
 
  # Safety
  `parents` must have `joint_count` numbers; `offsets` must be null or have 3 × `joint_count`; and `library` must
@@ -1803,10 +1826,12 @@ TumbleResult tumble_crowd_library_new(const int32_t *parents,
  (`tumble_crowd_library_set_reference`). `clip` receives the clip's index, counted from 0; it may be null.
 
  # Errors
- `TUMBLE_RESULT_INVALID_INPUT` if the set has not one track for each joint, a track has the name of no joint, a
- track cannot be interpolated as requested, the quantity is not the rotation, a curve rotates so fast that no
- polynomial fits it, the clip is too long, or the library is full; `TUMBLE_RESULT_INVALID_ARGUMENT` if a name is
- unknown. After any error the library is unchanged.
+ - `TUMBLE_RESULT_INVALID_INPUT` if the set has not one track for each joint, a track has the name of no joint, a
+   track cannot be interpolated as requested, the quantity is not the rotation, a curve rotates so fast that no
+   polynomial fits it, the clip is too long, or the library is full.
+ - `TUMBLE_RESULT_INVALID_ARGUMENT` if a name is unknown.
+
+ After any error the library is unchanged.
 
  # Safety
  `interpolation` must be null or point to a `TumbleInterpolation` whose `method` is null or a text that ends with a
@@ -1855,8 +1880,8 @@ TumbleResult tumble_crowd_library_set_inverse_bind(struct TumbleCrowdLibrary *li
                                                    size_t joint_count);
 
 /*
- Sets the reference pose of `clip`, from which its additive layers differ: the pose of the clip `from` at a tick.
- After the end of `from` it is its last pose.
+ Sets the reference pose of `clip`, from which its additive layers differ: the pose of the clip `from` at `tick`; for
+ ticks after the end of `from`, its last pose.
 
  # Errors
  `TUMBLE_RESULT_OUT_OF_RANGE` if one of the two clips does not exist.
@@ -1936,7 +1961,7 @@ TumbleResult tumble_crowd_library_of_file(const struct TumbleFile *file,
 
 /*
  Adds a clip of a file to a library. Tracks are matched to joints by name; the file may be another one than that of
- `tumble_crowd_library_of_file`. A joint has the same parent in the clip as in the library.
+ `tumble_crowd_library_of_file`. A joint must have the same parent in the clip as in the library.
 
  Joints that the clip does not have stay at rest. The clip must not have joints that the library does not have.
  `clip_of_file` is the index of the clip in the file, counted from 0. `interpolation` and `vectors` are as in
@@ -1945,8 +1970,10 @@ TumbleResult tumble_crowd_library_of_file(const struct TumbleFile *file,
  0; it may be null.
 
  # Errors
- `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such clip; `TUMBLE_RESULT_INVALID_INPUT` if its joints or methods do
- not fit, or its rotations are relative to the world; otherwise as `tumble_crowd_library_push`.
+ - `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such clip.
+ - `TUMBLE_RESULT_INVALID_INPUT` if the joints or methods of the clip do not fit, or its rotations are relative to
+   the world.
+ - Otherwise as `tumble_crowd_library_push`.
 
  # Safety
  `interpolation` must be null or point to a `TumbleInterpolation` whose `method` is null or a text that ends with a
@@ -1969,9 +1996,9 @@ TumbleResult tumble_crowd_library_push_clip(struct TumbleCrowdLibrary *library,
  the crowd with `tumble_crowd_free`.
 
  # Errors
- `TUMBLE_RESULT_WRONG_STATE` if the library has no clips; `TUMBLE_RESULT_INVALID_ARGUMENT` if the number of
- instances or layers is out of range; `TUMBLE_RESULT_OUT_OF_MEMORY` or `TUMBLE_RESULT_DEVICE` if there is not
- enough memory or the device fails.
+ - `TUMBLE_RESULT_WRONG_STATE` if the library has no clips.
+ - `TUMBLE_RESULT_INVALID_ARGUMENT` if the number of instances or layers is out of range.
+ - `TUMBLE_RESULT_OUT_OF_MEMORY` or `TUMBLE_RESULT_DEVICE` if there is not enough memory or the device fails.
 
  # Safety
  `crowd` must point to memory for a handle.
@@ -1989,9 +2016,10 @@ TumbleResult tumble_crowd_new(const struct TumbleEngine *engine,
  20 bytes each, reach the device with the next evaluation.
 
  # Errors
- `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such instance, layer, clip or mask; `TUMBLE_RESULT_INVALID_ARGUMENT`
- if another member is invalid. The message has the index of the first change that is refused. After any error
- nothing changes.
+ - `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such instance, layer, clip or mask.
+ - `TUMBLE_RESULT_INVALID_ARGUMENT` if another member is invalid.
+
+ The message has the index of the first change that is refused. After any error nothing changes.
 
  # Safety
  `layers` must have `count` structures.
@@ -2041,7 +2069,7 @@ TumbleResult tumble_crowd_advance(struct TumbleCrowd *crowd,
                                   double seconds);
 
 /*
- Sets the clock's time, ticks, forwards or backwards. All instances follow.
+ Sets the clock's time in ticks, forwards or backwards. All instances follow.
 
  # Errors
  `TUMBLE_RESULT_INVALID_ARGUMENT` if `ticks` is 2^52 or more.
@@ -2049,7 +2077,7 @@ TumbleResult tumble_crowd_advance(struct TumbleCrowd *crowd,
 TumbleResult tumble_crowd_set_clock(struct TumbleCrowd *crowd, uint64_t ticks);
 
 /*
- Returns the clock's time, ticks.
+ Returns the clock's time in ticks.
 
  # Safety
  `ticks` must point to memory for a number.
@@ -2067,8 +2095,10 @@ TumbleResult tumble_crowd_free(struct TumbleCrowd *crowd);
  stay, and its fade ends.
 
  # Errors
- `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such instance or layer; `TUMBLE_RESULT_INVALID_ARGUMENT` if the layer
- is layer 0, or a weight is outside 0 to 1. After any error nothing changes.
+ - `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such instance or layer.
+ - `TUMBLE_RESULT_INVALID_ARGUMENT` if the layer is layer 0, or a weight is outside 0 to 1.
+
+ After any error nothing changes.
  */
 TumbleResult tumble_crowd_set_weight(struct TumbleCrowd *crowd,
                                      size_t instance,
@@ -2083,8 +2113,10 @@ TumbleResult tumble_crowd_set_weight(struct TumbleCrowd *crowd,
  fade.
 
  # Errors
- `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such instance or layer; `TUMBLE_RESULT_INVALID_ARGUMENT` if the layer
- is layer 0, or a weight is outside 0 to 1. After any error nothing changes.
+ - `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such instance or layer.
+ - `TUMBLE_RESULT_INVALID_ARGUMENT` if the layer is layer 0, or a weight is outside 0 to 1.
+
+ After any error nothing changes.
  */
 TumbleResult tumble_crowd_fade(struct TumbleCrowd *crowd,
                                size_t instance,
@@ -2100,8 +2132,10 @@ TumbleResult tumble_crowd_fade(struct TumbleCrowd *crowd,
  weights at all times.
 
  # Errors
- `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such instance or layer; `TUMBLE_RESULT_INVALID_ARGUMENT` if the layer
- is layer 0, or a weight is outside 0 to 1. After any error nothing changes.
+ - `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such instance or layer.
+ - `TUMBLE_RESULT_INVALID_ARGUMENT` if the layer is layer 0, or a weight is outside 0 to 1.
+
+ After any error nothing changes.
 
  # Safety
  `fade` must point to a `TumbleCrowdFade`.
@@ -2135,8 +2169,10 @@ TumbleResult tumble_crowd_get_fade(const struct TumbleCrowd *crowd,
  may be in it twice. It is copied.
 
  # Errors
- `TUMBLE_RESULT_OUT_OF_RANGE` if an instance does not exist; `TUMBLE_RESULT_INVALID_ARGUMENT` if it is in the list
- twice. After any error nothing changes.
+ - `TUMBLE_RESULT_OUT_OF_RANGE` if an instance does not exist.
+ - `TUMBLE_RESULT_INVALID_ARGUMENT` if an instance is in the list twice.
+
+ After any error nothing changes.
 
  # Safety
  `instances` must have `count` numbers.
@@ -2177,9 +2213,10 @@ TumbleResult tumble_crowd_output_count(const struct TumbleCrowd *crowd,
  `tumble_crowd_output_count`.
 
  # Errors
- `TUMBLE_RESULT_WRONG_SIZE` if `output_count` is another number; `TUMBLE_RESULT_WRONG_STATE` if the result of
- `tumble_crowd_submit` was not taken, or skinning matrices are requested but the library has no inverse bind
- matrices; `TUMBLE_RESULT_DEVICE` if the device fails.
+ - `TUMBLE_RESULT_WRONG_SIZE` if `output_count` is another number.
+ - `TUMBLE_RESULT_WRONG_STATE` if the result of `tumble_crowd_submit` was not taken, or skinning matrices are
+   requested but the library has no inverse bind matrices.
+ - `TUMBLE_RESULT_DEVICE` if the device fails.
 
  # Safety
  `output` must have `output_count` floats, which nothing else uses during the call.
@@ -2210,8 +2247,9 @@ TumbleResult tumble_crowd_evaluate_half(struct TumbleCrowd *crowd,
  evaluates or submits again.
 
  # Errors
- `TUMBLE_RESULT_WRONG_STATE` if the result of the previous submission was not taken, or skinning matrices are
- requested but the library has no inverse bind matrices; `TUMBLE_RESULT_DEVICE` if the device fails.
+ - `TUMBLE_RESULT_WRONG_STATE` if the result of the previous submission was not taken, or skinning matrices are
+   requested but the library has no inverse bind matrices.
+ - `TUMBLE_RESULT_DEVICE` if the device fails.
  */
 TumbleResult tumble_crowd_submit(struct TumbleCrowd *crowd,
                                  uint32_t values,
@@ -2221,7 +2259,8 @@ TumbleResult tumble_crowd_submit(struct TumbleCrowd *crowd,
  Returns whether the submitted evaluation has ended, so that `tumble_crowd_wait` does not wait.
 
  # Errors
- `TUMBLE_RESULT_WRONG_STATE` if nothing was submitted; `TUMBLE_RESULT_DEVICE` if the device fails.
+ - `TUMBLE_RESULT_WRONG_STATE` if nothing was submitted.
+ - `TUMBLE_RESULT_DEVICE` if the device fails.
 
  # Safety
  `done` must point to memory for a `bool`.
@@ -2235,9 +2274,11 @@ TumbleResult tumble_crowd_poll(const struct TumbleCrowd *crowd, bool *done);
  submission.
 
  # Errors
- `TUMBLE_RESULT_WRONG_STATE` if nothing was submitted, or `half` was 1; `TUMBLE_RESULT_WRONG_SIZE` if
- `output_count` is another number; after these errors a submitted result can still be taken. `TUMBLE_RESULT_DEVICE`
- if the device fails.
+ - `TUMBLE_RESULT_WRONG_STATE` if nothing was submitted, or `half` was 1.
+ - `TUMBLE_RESULT_WRONG_SIZE` if `output_count` is another number.
+ - `TUMBLE_RESULT_DEVICE` if the device fails.
+
+ After the first two errors, a submitted result can still be taken.
 
  # Safety
  `output` must have `output_count` floats, which nothing else uses during the call.
@@ -2253,9 +2294,11 @@ TumbleResult tumble_crowd_wait(struct TumbleCrowd *crowd,
  time of the submission.
 
  # Errors
- `TUMBLE_RESULT_WRONG_STATE` if nothing was submitted, or `half` was 0; `TUMBLE_RESULT_WRONG_SIZE` if
- `output_count` is another number; after these errors a submitted result can still be taken. `TUMBLE_RESULT_DEVICE`
- if the device fails.
+ - `TUMBLE_RESULT_WRONG_STATE` if nothing was submitted, or `half` was 0.
+ - `TUMBLE_RESULT_WRONG_SIZE` if `output_count` is another number.
+ - `TUMBLE_RESULT_DEVICE` if the device fails.
+
+ After the first two errors, a submitted result can still be taken.
 
  # Safety
  `output` must have `output_count` numbers of 16 bits, which nothing else uses during the call.
@@ -2268,20 +2311,21 @@ TumbleResult tumble_crowd_wait_half(struct TumbleCrowd *crowd,
  Prepares the recording of evaluations of a crowd, whose results go to a range of the application's Vulkan buffer.
 
  Kernels are compiled and memory is allocated here, not when a frame is recorded. The crowd's engine must have been
- created by `tumble_engine_from_vulkan`; this call submits to its queue when it checks a new kernel. `values` is a
- `TumbleCrowdValues`. `half` is 0 for numbers of 32 bits, 1 for 16 bits. `buffer` is the `VkBuffer`, as a number:
- `(uint64_t)buffer`. The range starts at `offset`, a multiple of 256, and has `size` bytes: at least
- `tumble_crowd_output_count` × 4, or × 2 with `half` 1, and room for one instance. If it has room for more
- instances than are visible now, more may be visible later.
+ created by `tumble_engine_from_vulkan`. This call checks kernels that were not checked before, and then submits to
+ the engine's queue. `values` is a `TumbleCrowdValues`. `half` is 0 for numbers of 32 bits, 1 for 16 bits. `buffer`
+ is the `VkBuffer`, as a number: `(uint64_t)buffer`. The range starts at `offset`, a multiple of 256, and has `size`
+ bytes: at least `tumble_crowd_output_count` × 4, or × 2 with `half` 1, and room for one instance. If it has room for
+ more instances than are visible now, more may be visible later.
 
  The buffer must belong to the engine's device, be bound to memory, and have the usage
  `VK_BUFFER_USAGE_STORAGE_BUFFER_BIT`. The application frees the target with `tumble_crowd_target_free` before it
  destroys the buffer or the device.
 
  # Errors
- `TUMBLE_RESULT_INVALID_ARGUMENT` if the engine was not created by `tumble_engine_from_vulkan`;
- `TUMBLE_RESULT_WRONG_SIZE` if the range is not aligned or too short; `TUMBLE_RESULT_WRONG_STATE` if skinning
- matrices are requested but the library has no inverse bind matrices; `TUMBLE_RESULT_DEVICE` if the device fails.
+ - `TUMBLE_RESULT_INVALID_ARGUMENT` if the engine was not created by `tumble_engine_from_vulkan`.
+ - `TUMBLE_RESULT_WRONG_SIZE` if the range is not aligned or too short.
+ - `TUMBLE_RESULT_WRONG_STATE` if skinning matrices are requested but the library has no inverse bind matrices.
+ - `TUMBLE_RESULT_DEVICE` if the device fails.
 
  # Safety
  The buffer must be as described, and `target` must point to memory for a handle.
@@ -2310,8 +2354,10 @@ TumbleResult tumble_crowd_target_new(const struct TumbleCrowd *crowd,
  at the same time without a lock.
 
  # Errors
- `TUMBLE_RESULT_INVALID_ARGUMENT` if the target belongs to another crowd; `TUMBLE_RESULT_WRONG_SIZE` if more
- instances are visible than it has room for. After any error nothing is recorded.
+ - `TUMBLE_RESULT_INVALID_ARGUMENT` if the target belongs to another crowd.
+ - `TUMBLE_RESULT_WRONG_SIZE` if more instances are visible than the target has room for.
+
+ After any error nothing is recorded.
 
  # Safety
  The command buffer must be as described, nothing else may use it during the call, and its commands must be

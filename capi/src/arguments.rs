@@ -93,7 +93,7 @@ pub(crate) fn vulkan<T: Handle>(pointer: *mut c_void, name: &str) -> Result<T, F
 /// # Safety
 /// The structure is `repr(C)`, its first member is a `usize`, and zeros are valid values of all members.
 pub(crate) unsafe trait SizedStructure: Copy {
-    /// The size of the first version's structure, bytes.
+    /// The size of the first version's structure in bytes.
     const FIRST_SIZE: usize;
 }
 

@@ -74,9 +74,11 @@ pub unsafe extern "C" fn tumble_set_sample_count(
 /// copy.
 ///
 /// # Errors
-/// `TUMBLE_RESULT_WRONG_SIZE` if `output_count` is another number; `TUMBLE_RESULT_INVALID_INPUT` if the sample times
-/// are invalid, or a track cannot be interpolated as requested; `TUMBLE_RESULT_DEVICE` if the device fails. All
-/// arguments are checked before anything is written.
+/// - `TUMBLE_RESULT_WRONG_SIZE` if `output_count` is another number.
+/// - `TUMBLE_RESULT_INVALID_INPUT` if the sample times are invalid, or a track cannot be interpolated as requested.
+/// - `TUMBLE_RESULT_DEVICE` if the device fails.
+///
+/// All arguments are checked before anything is written.
 ///
 /// # Safety
 /// `interpolation` must be null or point to a `TumbleInterpolation` whose `method` is null or a text that ends with a
@@ -117,8 +119,8 @@ pub unsafe extern "C" fn tumble_evaluate(
 /// before it. The caller frees the clip with `tumble_clip_free`.
 ///
 /// # Errors
-/// `TUMBLE_RESULT_INVALID_INPUT` if a track cannot be interpolated as requested; `TUMBLE_RESULT_OUT_OF_MEMORY` or
-/// `TUMBLE_RESULT_DEVICE` if the device lacks memory or fails.
+/// - `TUMBLE_RESULT_INVALID_INPUT` if a track cannot be interpolated as requested.
+/// - `TUMBLE_RESULT_OUT_OF_MEMORY` or `TUMBLE_RESULT_DEVICE` if the device lacks memory or fails.
 ///
 /// # Safety
 /// `interpolation` must be null or point to a `TumbleInterpolation` whose `method` is null or a text that ends with a
@@ -147,9 +149,10 @@ pub unsafe extern "C" fn tumble_upload(
     })
 }
 
-/// Returns the memory that a clip takes on the host for each key, bytes: 16 and more of a clip that keeps its keys,
-/// 64, or 144 to 208, and more of one that keeps segments. On the CPU, large clips whose samples can be computed from
-/// their keys keep these.
+/// Returns the memory that a clip takes on the host for each key, in bytes: 16 or more if the clip keeps its keys; if
+/// the clip keeps segments, 64 or more for arcs (slerp), and 144 to 208 or more for polynomials. On the CPU, a clip
+/// whose segments would exceed the limit `memory` of `TumbleEngineOptions` keeps its keys instead, if samples can be
+/// computed from them.
 ///
 /// # Safety
 /// `bytes` must point to memory for a number.
@@ -232,8 +235,9 @@ pub unsafe extern "C" fn tumble_clip_evaluate(
 /// returns when the result is written. Commands that are submitted to the queue afterwards see it.
 ///
 /// # Errors
-/// `TUMBLE_RESULT_INVALID_ARGUMENT` if the engine was not created by `tumble_engine_from_vulkan`;
-/// `TUMBLE_RESULT_WRONG_SIZE` if the range is not aligned or too short; otherwise as `tumble_evaluate`.
+/// - `TUMBLE_RESULT_INVALID_ARGUMENT` if the engine was not created by `tumble_engine_from_vulkan`.
+/// - `TUMBLE_RESULT_WRONG_SIZE` if the range is not aligned or too short.
+/// - Otherwise as `tumble_evaluate`.
 ///
 /// # Safety
 /// `samples` must point to a `TumbleSamples` whose `times` has `time_count` numbers. The buffer must be as described,

@@ -41,7 +41,7 @@ impl Object for TumbleEngine {
 pub struct TumbleEngineOptions {
     /// `sizeof(TumbleEngineOptions)`.
     pub size: usize,
-    /// The limit of memory, bytes: on a Vulkan device for everything except results, on the CPU for the segments of a
+    /// The limit of memory in bytes: on a Vulkan device for everything except results, on the CPU for the segments of a
     /// set. Larger sets are prepared piece by piece. 0: no limit.
     pub memory: u64,
     /// The number of worker threads of the CPU, up to 1024; ignored on a Vulkan device. 0: all engines share a pool
@@ -76,8 +76,8 @@ unsafe impl SizedStructure for TumbleEngineOptions {
 /// `tumble_engine_free`.
 ///
 /// # Errors
-/// `TUMBLE_RESULT_DEVICE` if there is no such device, it cannot be opened, or it fails the self-test;
-/// `TUMBLE_RESULT_INVALID_ARGUMENT` if an option is out of its range.
+/// - `TUMBLE_RESULT_DEVICE` if there is no such device, it cannot be opened, or it fails the self-test.
+/// - `TUMBLE_RESULT_INVALID_ARGUMENT` if an option is out of its range.
 ///
 /// # Safety
 /// `device` must be null or a text that ends with a zero byte, `options` must be null or point to a

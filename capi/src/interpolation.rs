@@ -24,7 +24,7 @@ pub enum TumbleKeySigns {
     AsAuthored = 1,
 }
 
-/// The boundary condition: the curve in the first and in the last segment, where a neighbouring key is missing.
+/// The boundary condition: the curve in the first and in the last interval, where a neighbouring key is missing.
 #[repr(u32)]
 #[derive(Debug, Clone, Copy)]
 pub enum TumbleEnds {
@@ -40,7 +40,7 @@ pub enum TumbleEnds {
     Secant = 4,
     /// The curve is closed and smooth there. The last key must equal the first, within 0.002 rad.
     Loop = 5,
-    /// The first and the last segment are constant, with the value of their first key.
+    /// The first and the last interval are constant, with the value of the first key of each.
     Frozen = 6,
 }
 
@@ -50,13 +50,13 @@ pub enum TumbleEnds {
 pub enum TumbleQuantity {
     /// The rotation relative to the parent, a unit quaternion `x y z w`.
     Rotation = 0,
-    /// The angular velocity in the axes of the rotating body, rad/s: `x y z 0`.
+    /// The angular velocity in the axes of the rotating body in rad/s: `x y z 0`.
     VelocityInBody = 1,
-    /// The angular velocity in the axes of the parent, rad/s: `x y z 0`.
+    /// The angular velocity in the axes of the parent in rad/s: `x y z 0`.
     VelocityInParent = 2,
-    /// The angular acceleration in the axes of the rotating body, rad/s²: `x y z 0`.
+    /// The angular acceleration in the axes of the rotating body in rad/s²: `x y z 0`.
     AccelerationInBody = 3,
-    /// The angular acceleration in the axes of the parent, rad/s²: `x y z 0`.
+    /// The angular acceleration in the axes of the parent in rad/s²: `x y z 0`.
     AccelerationInParent = 4,
 }
 
@@ -113,8 +113,8 @@ pub struct TumbleInterpolation {
     /// The tension of "kochanek-bartels"; 0 is neutral, usual values are from -1 to 1. With 1 the velocity at a key
     /// is 0, with -1 it is doubled.
     pub tension: f64,
-    /// The continuity of "kochanek-bartels", likewise. With -1 the curve has a corner at a key, with 1 a corner to
-    /// the other side.
+    /// The continuity of "kochanek-bartels", likewise. With -1 the curve has a corner at a key; with 1 the corner
+    /// points the other way, because the curve swings out beyond the key before and after it.
     pub continuity: f64,
     /// The bias of "kochanek-bartels", likewise. With 1 the tangent at a key follows the interval before it, with -1
     /// the interval after it.

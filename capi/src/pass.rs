@@ -37,9 +37,9 @@ pub enum TumblePassOperation {
 pub struct TumbleBufferRange {
     /// The `VkBuffer`, as a number: `(uint64_t)buffer`.
     pub buffer: u64,
-    /// The start of the range, bytes.
+    /// The start of the range in bytes.
     pub offset: u64,
-    /// The length of the range, bytes.
+    /// The length of the range in bytes.
     pub size: u64,
 }
 
@@ -58,9 +58,10 @@ pub struct TumblePass {
     pub track_count: usize,
     /// The number of samples of each track.
     pub sample_count: usize,
-    /// The inputs, as the operation says. Each range starts at a multiple of 256, the layers of a blend at multiples
-    /// of 16, and has at least 16 × `track_count` × `sample_count` bytes. Layers that are contiguous in one buffer,
-    /// from a multiple of 256 on, are read directly; others are first copied into one buffer.
+    /// The inputs, as the operation says. Each range has at least 16 × `track_count` × `sample_count` bytes. For
+    /// `TUMBLE_PASS_OPERATION_BLEND`, each range must start at a multiple of 16; for other operations, at a multiple of
+    /// 256. Layers of a blend that follow each other in one buffer, the first at a multiple of 256, are read directly;
+    /// others are first copied into one buffer.
     pub inputs: *const TumbleBufferRange,
     /// The number of `inputs`.
     pub input_count: usize,
@@ -182,9 +183,10 @@ impl TumblePass {
 /// `TUMBLE_PASS_OPERATION_WORLD`, whose result is a rotation `x y z w` and a position `x y z 0` each.
 ///
 /// # Errors
-/// `TUMBLE_RESULT_INVALID_ARGUMENT` if a constant is unknown, the number of inputs or weights is not the operation's,
-/// or the engine was not created by `tumble_engine_from_vulkan`; `TUMBLE_RESULT_INVALID_POINTER` if an array is null;
-/// `TUMBLE_RESULT_INVALID_INPUT` if the skeleton is refused.
+/// - `TUMBLE_RESULT_INVALID_ARGUMENT` if a constant is unknown, the number of inputs or weights is not the operation's,
+///   or the engine was not created by `tumble_engine_from_vulkan`.
+/// - `TUMBLE_RESULT_INVALID_POINTER` if an array is null.
+/// - `TUMBLE_RESULT_INVALID_INPUT` if the skeleton is refused.
 ///
 /// # Safety
 /// `pass` must point to a `TumblePass` whose pointers are null or as its members say, and `bytes` must point to memory
@@ -207,8 +209,8 @@ pub unsafe extern "C" fn tumble_pass_bytes(
     })
 }
 
-/// Runs a pass with its result in a range of a buffer, and waits for it. Commands that are submitted to the engine's
-/// queue afterwards see the result; the inputs may be written by commands that were submitted there before.
+/// Runs a pass whose result goes to a range of a buffer, and waits for the result. Commands that are submitted to the
+/// engine's queue afterwards see the result; the inputs may be written by commands that were submitted there before.
 ///
 /// The range starts at a multiple of 256, has at least the bytes of `tumble_pass_bytes`, and does not overlap an
 /// input. All buffers must belong to the engine's device, be bound to memory, and have the usage
@@ -216,9 +218,11 @@ pub unsafe extern "C" fn tumble_pass_bytes(
 /// `VK_BUFFER_USAGE_TRANSFER_SRC_BIT` too. This call submits to the engine's queue.
 ///
 /// # Errors
-/// As `tumble_pass_bytes`; also `TUMBLE_RESULT_WRONG_SIZE` if a range is not aligned or too short;
-/// `TUMBLE_RESULT_INVALID_ARGUMENT` if there is no layer, a weight is out of its range, the layout for a skeleton is
-/// track by track, or the result overlaps an input; `TUMBLE_RESULT_DEVICE` if the device fails.
+/// - As `tumble_pass_bytes`.
+/// - `TUMBLE_RESULT_WRONG_SIZE` if a range is not aligned or too short.
+/// - `TUMBLE_RESULT_INVALID_ARGUMENT` if there is no layer, a weight is out of its range, the layout for a skeleton is
+///   track by track, or the result overlaps an input.
+/// - `TUMBLE_RESULT_DEVICE` if the device fails.
 ///
 /// # Safety
 /// `pass` must point to a `TumblePass` whose pointers are null or as its members say; the buffers must be as
@@ -251,10 +255,10 @@ impl Object for TumblePassTarget {
 
 /// Prepares the recording of a pass, whose result goes to a range of the application's Vulkan buffer.
 ///
-/// The kernel is compiled and memory is allocated here, not when a frame is recorded; this call submits to the
-/// engine's queue when it checks a new kernel. The buffers must be as `tumble_pass_to_buffer` says. The target does
-/// not need the engine afterwards. The application frees it with `tumble_pass_target_free` before it destroys a buffer
-/// or the device.
+/// The kernel is compiled and memory is allocated here, not when a frame is recorded. If the kernel was not checked
+/// before, this call checks it, and then submits to the engine's queue. The buffers must be as `tumble_pass_to_buffer`
+/// says. The target does not need the engine afterwards. The application frees the target with
+/// `tumble_pass_target_free` before it destroys a buffer or the device.
 ///
 /// # Errors
 /// As `tumble_pass_to_buffer`.

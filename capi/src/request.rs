@@ -140,9 +140,10 @@ pub extern "C" fn tumble_encoding_name(index: usize) -> *const c_char {
 /// Returns the size of a request's result in bytes.
 ///
 /// # Errors
-/// `TUMBLE_RESULT_INVALID_ARGUMENT` if a constant or a name is unknown; `TUMBLE_RESULT_OUT_OF_RANGE` if the clip does
-/// not have these tracks or samples; `TUMBLE_RESULT_INVALID_INPUT` if the sample times are invalid, or the encoding
-/// is for rotations and the clip's quantity is a velocity or an acceleration.
+/// - `TUMBLE_RESULT_INVALID_ARGUMENT` if a constant or a name is unknown.
+/// - `TUMBLE_RESULT_OUT_OF_RANGE` if the clip does not have these tracks or samples.
+/// - `TUMBLE_RESULT_INVALID_INPUT` if the sample times are invalid, or the encoding is for rotations and the clip's
+///   quantity is a velocity or an acceleration.
 ///
 /// # Safety
 /// `request` must point to a `TumbleRequest` whose pointers are null or as its members say, and `bytes` must point to
@@ -171,8 +172,11 @@ pub unsafe extern "C" fn tumble_request_bytes(
 /// `tumble_request_bytes`. Memory that is aligned to 16 bytes is filled without a copy.
 ///
 /// # Errors
-/// As `tumble_request_bytes`; also `TUMBLE_RESULT_WRONG_SIZE` if `output_bytes` is another number, and
-/// `TUMBLE_RESULT_DEVICE` if the device fails. All arguments are checked before anything is written.
+/// - As `tumble_request_bytes`.
+/// - `TUMBLE_RESULT_WRONG_SIZE` if `output_bytes` is another number.
+/// - `TUMBLE_RESULT_DEVICE` if the device fails.
+///
+/// All arguments are checked before anything is written.
 ///
 /// # Safety
 /// `request` must point to a `TumbleRequest` whose pointers are null or as its members say, and `output` must have
@@ -209,17 +213,18 @@ impl Object for TumbleClipTarget {
 /// Prepares the recording of a request of a clip, whose result goes to a range of the application's Vulkan buffer.
 ///
 /// Kernels are compiled and work lists are uploaded here, not when a frame is recorded. The clip's engine must have
-/// been created by `tumble_engine_from_vulkan`; this call submits to its queue. `buffer` is the `VkBuffer`, as a
-/// number: `(uint64_t)buffer`. The range starts at `offset`, a multiple of the bytes of a value (16 for "f32"), and
-/// has `size` bytes, at least those of `tumble_request_bytes`. The buffer must belong to the engine's device, be
-/// bound to memory, and have the usages `VK_BUFFER_USAGE_STORAGE_BUFFER_BIT` and `VK_BUFFER_USAGE_TRANSFER_DST_BIT`.
+/// been created by `tumble_engine_from_vulkan`. This call submits to the engine's queue. `buffer` is the `VkBuffer`, as
+/// a number: `(uint64_t)buffer`. The range starts at `offset`, a multiple of the bytes of a value (16 for "f32"), and
+/// has `size` bytes, at least those of `tumble_request_bytes`. The buffer must belong to the engine's device, be bound
+/// to memory, and have the usages `VK_BUFFER_USAGE_STORAGE_BUFFER_BIT` and `VK_BUFFER_USAGE_TRANSFER_DST_BIT`.
 ///
-/// The target needs neither the clip nor the engine afterwards. The application frees it with
+/// The target needs neither the clip nor the engine afterwards. The application frees the target with
 /// `tumble_clip_target_free` before it destroys the buffer or the device.
 ///
 /// # Errors
-/// As `tumble_request_bytes`; also `TUMBLE_RESULT_INVALID_ARGUMENT` if the engine was not created by
-/// `tumble_engine_from_vulkan`, and `TUMBLE_RESULT_WRONG_SIZE` if the range is not aligned or too short.
+/// - As `tumble_request_bytes`.
+/// - `TUMBLE_RESULT_INVALID_ARGUMENT` if the engine was not created by `tumble_engine_from_vulkan`.
+/// - `TUMBLE_RESULT_WRONG_SIZE` if the range is not aligned or too short.
 ///
 /// # Safety
 /// `request` must point to a `TumbleRequest` whose pointers are null or as its members say; the buffer must be as

@@ -10,8 +10,8 @@ use crate::handle::{self, Object};
 use crate::result::{Failure, TumbleResult, code};
 
 /// A sampler: it evaluates a clip at one time after another, on the calling thread, for programs that need a pose now.
-/// It is fastest if most times are near the one before. Threads may share a sampler, but wait for each other; give each
-/// its own (`tumble_sampler_copy`).
+/// Sampling is fastest if most times are near the time before. Threads that share a sampler wait for each other; give
+/// each thread its own (`tumble_sampler_copy`).
 pub struct TumbleSampler {
     inner: Mutex<Sampler>,
 }
@@ -36,7 +36,8 @@ fn give(sampler: Sampler) -> *mut TumbleSampler {
 /// The clip may be freed before the sampler. The caller frees the sampler with `tumble_sampler_free`.
 ///
 /// # Errors
-/// `TUMBLE_RESULT_OUT_OF_MEMORY` if the clip exceeds its engine's memory limit, so that its segments are not kept.
+/// `TUMBLE_RESULT_OUT_OF_MEMORY` if the segments of the clip exceed its engine's memory limit, and samples cannot be
+/// computed from its keys within the limit.
 ///
 /// # Safety
 /// `sampler` must point to memory for a handle.
@@ -73,11 +74,12 @@ pub unsafe extern "C" fn tumble_sampler_copy(
     })
 }
 
-/// Evaluates one track at a time, seconds. `value` receives four floats, according to the quantity of the clip's
-/// interpolation. Nothing is allocated.
+/// Evaluates one track at `time`, which is in seconds. `value` receives four floats, according to the quantity of the
+/// clip's interpolation. Nothing is allocated.
 ///
 /// # Errors
-/// `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such track; `TUMBLE_RESULT_INVALID_INPUT` if the time is not finite.
+/// - `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such track.
+/// - `TUMBLE_RESULT_INVALID_INPUT` if the time is not finite.
 ///
 /// # Safety
 /// `value` must have four floats, which nothing else uses during the call.
@@ -97,12 +99,12 @@ pub unsafe extern "C" fn tumble_sampler_sample(
     })
 }
 
-/// Evaluates every track at a time, seconds, into the caller's memory: four floats for each track. `output_count` is the
-/// number of floats. Nothing is allocated.
+/// Evaluates every track at `time`, which is in seconds, into the caller's memory: four floats for each track.
+/// `output_count` is the number of floats. Nothing is allocated.
 ///
 /// # Errors
-/// `TUMBLE_RESULT_WRONG_SIZE` if `output_count` is not 4 × tracks; `TUMBLE_RESULT_INVALID_INPUT` if the time is not
-/// finite.
+/// - `TUMBLE_RESULT_WRONG_SIZE` if `output_count` is not 4 × tracks.
+/// - `TUMBLE_RESULT_INVALID_INPUT` if the time is not finite.
 ///
 /// # Safety
 /// `output` must have `output_count` floats, which nothing else uses during the call.
@@ -123,12 +125,13 @@ pub unsafe extern "C" fn tumble_sampler_pose(
     })
 }
 
-/// Evaluates some tracks at a time, seconds, into the caller's memory: four floats for each of the `track_count` indices
-/// in `tracks`. `output_count` is the number of floats. Nothing is allocated.
+/// Evaluates some tracks at `time`, which is in seconds, into the caller's memory: four floats for each of the
+/// `track_count` indices in `tracks`. `output_count` is the number of floats. Nothing is allocated.
 ///
 /// # Errors
-/// `TUMBLE_RESULT_WRONG_SIZE` if `output_count` is not 4 × `track_count`; `TUMBLE_RESULT_OUT_OF_RANGE` if there is no
-/// such track; `TUMBLE_RESULT_INVALID_INPUT` if the time is not finite.
+/// - `TUMBLE_RESULT_WRONG_SIZE` if `output_count` is not 4 × `track_count`.
+/// - `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such track.
+/// - `TUMBLE_RESULT_INVALID_INPUT` if the time is not finite.
 ///
 /// # Safety
 /// `tracks` must have `track_count` numbers, and `output` must have `output_count` floats, which nothing else uses

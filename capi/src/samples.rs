@@ -41,13 +41,13 @@ pub struct TumbleSamples {
     /// The numerator of the frame rate: there are `rate_frames` frames in `rate_seconds` seconds, such as 60 in 1, or
     /// 30000 in 1001.
     pub rate_frames: u64,
-    /// The denominator of the frame rate, seconds; 0 means 1.
+    /// The denominator of the frame rate: a number of seconds; 0 means 1.
     pub rate_seconds: u64,
-    /// The time of the first frame, seconds, for `TUMBLE_SAMPLING_RANGE`.
+    /// The time of the first frame in seconds, for `TUMBLE_SAMPLING_RANGE`.
     pub start: f64,
-    /// The time after which there are no frames, seconds, for `TUMBLE_SAMPLING_RANGE`; not before `start`.
+    /// The time in seconds after which there are no frames, for `TUMBLE_SAMPLING_RANGE`; not before `start`.
     pub end: f64,
-    /// The sample times, seconds, for `TUMBLE_SAMPLING_TIMES` and `TUMBLE_SAMPLING_TIMES_OF_TRACKS`. They are copied
+    /// The sample times in seconds, for `TUMBLE_SAMPLING_TIMES` and `TUMBLE_SAMPLING_TIMES_OF_TRACKS`. They are copied
     /// during the call.
     pub times: *const f64,
     /// The number of `times`, for all tracks together.

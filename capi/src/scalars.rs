@@ -25,11 +25,12 @@ pub enum TumbleScalarQuantity {
     Acceleration = 2,
 }
 
-/// Appends a scalar of `key_count` keys, at least one, to a set. A set may have scalars without tracks.
+/// Appends a scalar to a set: a number that changes over time, such as the angle of a hinge or a weight, with
+/// `key_count` keys, at least one. A set may have scalars without tracks.
 ///
-/// `name` is its name in UTF-8. `times` are the key times in seconds, strictly
-/// increasing, and `keys` a number for each. `tangents` are for the method "gltf-cubic" and may be null: two numbers
-/// for each time, the incoming tangent and the outgoing one, in units per second. Arrays and name are copied.
+/// `name` is the scalar's name in UTF-8. `times` are the key times in seconds, strictly increasing, and `keys` a number
+/// for each. `tangents` are for the method "gltf-cubic" and may be null: two numbers for each time, the incoming
+/// tangent and the outgoing one, in units per second. Arrays and name are copied.
 ///
 /// # Errors
 /// `TUMBLE_RESULT_INVALID_INPUT` if there are no keys, the times are not finite and strictly increasing, or a number
@@ -78,15 +79,17 @@ pub extern "C" fn tumble_set_scalar_count(set: *const TumbleSet) -> usize {
 
 /// Evaluates the scalars of a set, or how fast they change, into the caller's memory, and waits for the result.
 ///
-/// `interpolation` may be null for the defaults. Scalars are interpolated as translations are by its method
-/// (docs/methods.md): by "slerp" along lines, by "bessel-overhauser" with continuous velocities. Its ends and wraps
-/// apply; its quantity does not. `quantity` is a `TumbleScalarQuantity`, `layout` a `TumbleLayout`. `output` receives a
-/// float for each sample of each scalar. `output_count` is the number of floats, exactly scalars × samples
-/// (`tumble_set_scalar_count`, `tumble_set_sample_count`).
+/// `interpolation` may be null for the defaults. The method of `interpolation` determines how scalars are interpolated,
+/// as it does for translations (docs/methods.md): "slerp" along lines, "bessel-overhauser" with continuous velocities.
+/// The ends and wraps of `interpolation` apply; its quantity is ignored. `quantity` is a `TumbleScalarQuantity`,
+/// `layout` a `TumbleLayout`. `output` receives a float for each sample of each scalar. `output_count` is the number of
+/// floats, exactly scalars × samples (`tumble_set_scalar_count`, `tumble_set_sample_count`).
 ///
 /// # Errors
-/// `TUMBLE_RESULT_WRONG_SIZE` if `output_count` is another number; otherwise as `tumble_evaluate`. On an error nothing
-/// is written.
+/// - `TUMBLE_RESULT_WRONG_SIZE` if `output_count` is another number.
+/// - Otherwise as `tumble_evaluate`.
+///
+/// On an error nothing is written.
 ///
 /// # Safety
 /// As `tumble_evaluate`.

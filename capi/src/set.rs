@@ -145,8 +145,8 @@ fn track(set: &TrackSet, index: usize) -> Result<Track<'_>, Failure> {
 
 /// Returns pointers to the key times and the rotation keys of the track `index`, counted from 0.
 ///
-/// `times` receives a pointer to `key_count` numbers in seconds, and `keys` a pointer to 4 × `key_count` numbers,
-/// `x y z w` for each key. The arrays belong to the set: they stay valid until a track is pushed to it or it is
+/// `times` receives a pointer to `key_count` numbers in seconds, and `keys` a pointer to 4 × `key_count` numbers, `x y
+/// z w` for each key. The arrays belong to the set and stay valid until a track is pushed to the set, or the set is
 /// freed.
 ///
 /// # Errors
@@ -190,8 +190,9 @@ const _: () = assert!(size_of::<Quat>() == size_of::<[f32; 4]>());
 /// If `buffer` is null, only `length` is written.
 ///
 /// # Errors
-/// `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such track; `TUMBLE_RESULT_WRONG_SIZE` if `buffer` is not null and
-/// `size` is less than the length + 1: then `length` is written, and `buffer` is not.
+/// - `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such track.
+/// - `TUMBLE_RESULT_WRONG_SIZE` if `buffer` is not null and `size` is less than the length + 1: then `length` is
+///   written, and `buffer` is not.
 ///
 /// # Safety
 /// `buffer` must be null or have `size` bytes, and `length` must point to memory for a number.
@@ -231,7 +232,7 @@ pub unsafe extern "C" fn tumble_set_track_name(
     })
 }
 
-/// Returns the first and the last key time of all tracks, seconds; key times of translations and scales count too.
+/// Returns the first and the last key time of all tracks in seconds; key times of translations and scales count too.
 ///
 /// # Errors
 /// `TUMBLE_RESULT_OUT_OF_RANGE` if the set has no tracks.

@@ -55,9 +55,11 @@ unsafe fn give(
 /// arrays are copied.
 ///
 /// # Errors
-/// `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such track; `TUMBLE_RESULT_INVALID_INPUT` if the times are not finite
-/// and strictly increasing, or a number is not finite or exceeds 1e30 in magnitude. After any error the set is
-/// unchanged.
+/// - `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such track.
+/// - `TUMBLE_RESULT_INVALID_INPUT` if the times are not finite and strictly increasing, or a number is not finite or
+///   exceeds 1e30 in magnitude.
+///
+/// After any error the set is unchanged.
 ///
 /// # Safety
 /// `times` must have `key_count` numbers and `keys` 3 × `key_count`; `tangents` must be null or have 6 × `key_count`.

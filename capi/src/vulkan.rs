@@ -48,21 +48,21 @@ pub struct TumbleVulkan {
     pub copy_queue: *mut c_void,
     /// The family of `copy_queue`; ignored if that is null.
     pub copy_queue_family: u32,
-    /// A function that locks `queue`, or null. The library calls it with `queue_user` before each submission to
-    /// `queue`, on any thread, and `unlock_queue` after it. The application must use the same lock for `queue`, and
-    /// must not have it locked when it calls the library, which would wait forever. If `lock_queue` is null,
-    /// `unlock_queue` must be null too, and the application must not use `queue` during a call that submits to it.
-    /// Several engines on one queue need no lock among themselves.
+    /// A function that locks `queue`, or null. The library calls this function with `queue_user` before each submission
+    /// to `queue`, on any thread, and `unlock_queue` after the submission. The application must use the same lock for
+    /// `queue`, and must not hold the lock when it calls the library, which would wait forever. If `lock_queue` is
+    /// null, `unlock_queue` must be null too, and the application must not use `queue` during a call that submits to
+    /// it. Several engines on one queue need no lock among themselves.
     pub lock_queue: Option<unsafe extern "C" fn(user: *mut c_void)>,
     /// The function that unlocks `queue`; the library calls it on the thread that called `lock_queue`.
     pub unlock_queue: Option<unsafe extern "C" fn(user: *mut c_void)>,
-    /// The argument of both functions. It must stay valid until the engine and all objects that were made with it are
-    /// freed.
+    /// The argument of `lock_queue` and `unlock_queue`. It must stay valid until the engine and all objects that were
+    /// made with it are freed.
     pub queue_user: *mut c_void,
     /// The application's `VkPipelineCache`, in which the library makes its pipelines, or 0 (`VK_NULL_HANDLE`). It must
     /// not be synchronized externally, and must stay valid until the engine and all objects that were made with it are
-    /// freed. The library neither reads it from a file nor writes it to one. 0: the library makes a cache and keeps it
-    /// in a file (`TumbleEngineOptions.cache_directory`).
+    /// freed. The library neither reads this cache from a file nor writes it to one. 0: the library makes a cache and
+    /// keeps it in a file (`TumbleEngineOptions.cache_directory`).
     pub pipeline_cache: u64,
 }
 
@@ -217,9 +217,10 @@ pub(crate) fn buffer_range(
 /// one queue: they take turns.
 ///
 /// # Errors
-/// `TUMBLE_RESULT_INVALID_POINTER` if a required handle or function is null; `TUMBLE_RESULT_INVALID_ARGUMENT` if the
-/// version is below 1.1 or above the loader's, or the physical device or a queue family does not fit;
-/// `TUMBLE_RESULT_DEVICE` if the device fails the self-test.
+/// - `TUMBLE_RESULT_INVALID_POINTER` if a required handle or function is null.
+/// - `TUMBLE_RESULT_INVALID_ARGUMENT` if the version is below 1.1 or above the loader's, or the physical device or a
+///   queue family does not fit.
+/// - `TUMBLE_RESULT_DEVICE` if the device fails the self-test.
 ///
 /// # Safety
 /// `vulkan` must point to a `TumbleVulkan` whose handles are valid, belong together and live as long as described;

@@ -4,7 +4,7 @@
 //! message on standard error and an exit code (`messages`). Data goes to standard output, and messages to standard
 //! error. The program is a library, so that other front ends can run it. Its interface is not stable.
 
-// Tests may use what systems round differently (clippy.toml).
+// Tests may use functions whose last bit differs between systems (clippy.toml).
 #![cfg_attr(test, allow(clippy::disallowed_methods))]
 
 mod arguments;

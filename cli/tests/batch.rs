@@ -64,7 +64,7 @@ fn batches_of_older_names_of_options_are_resumed() {
         let older = manifest.replace(" edges=loop ", " ends=loop ");
         fs::write(folder.join("out/manifest.jsonl"), older).unwrap();
         let again = succeed(folder, &[&line[..], &["--resume"]].concat());
-        assert!(again.words.contains("2 results skipped"), "{}", again.words);
+        assert!(again.words.contains("2 results kept"), "{}", again.words);
     }
     let other = [&batch[..], &["--edges", "keep", "--resume"]].concat();
     assert!(succeed(folder, &other).words.contains("2 results made"));
@@ -99,13 +99,17 @@ fn a_batch_goes_on_after_a_failure_and_can_be_checked() {
     let resumed = run(folder, &[&batch[..], &["--resume"]].concat());
     assert_eq!(resumed.code, 3, "{}", resumed.words);
     assert!(
-        resumed.words.contains("2 results skipped"),
+        resumed.words.contains("2 results kept"),
         "{}",
         resumed.words
     );
     assert_eq!(tree(&folder.join("out")), whole);
     let slerp = run(folder, &[&batch[..], &["--resume", "-m", "slerp"]].concat());
-    assert!(!slerp.words.contains("skipped"), "{}", slerp.words);
+    assert!(
+        !slerp.words.contains("(already complete)"),
+        "{}",
+        slerp.words
+    );
     assert_ne!(tree(&folder.join("out"))["a.npy"], whole["a.npy"]);
     run(folder, &[&batch[..], &["--overwrite"]].concat());
     assert_eq!(tree(&folder.join("out")), whole);
@@ -150,7 +154,11 @@ fn one_flipped_bit_is_found_and_made_good() {
         check.words
     );
     let resumed = succeed(folder, &[&batch[..], &["--resume"]].concat());
-    assert!(!resumed.words.contains("skipped"), "{}", resumed.words);
+    assert!(
+        !resumed.words.contains("(already complete)"),
+        "{}",
+        resumed.words
+    );
     assert_eq!(tree(&folder.join("out")), whole);
     succeed(folder, &["check", "out"]);
 
@@ -212,8 +220,8 @@ fn an_input_is_all_files_that_it_refers_to() {
     succeed(folder, &batch);
     succeed(folder, &["check", "out"]);
     let again = succeed(folder, &batch);
-    let skipped = "3 results of 2 inputs skipped";
-    assert!(again.words.contains(skipped), "{}", again.words);
+    let kept = "3 results of 2 inputs kept";
+    assert!(again.words.contains(kept), "{}", again.words);
     let before = tree(&folder.join("out"));
     write(-0.8);
     let check = run(folder, &["check", "out"]);
@@ -221,7 +229,7 @@ fn an_input_is_all_files_that_it_refers_to() {
     let stale = "m.Run.npy: its input m.gltf (or a file that belongs to it) has changed";
     assert!(check.words.contains(stale), "{}", check.words);
     let again = succeed(folder, &batch);
-    let made = "2 results made of 1 input, 1 result skipped";
+    let made = "2 results made of 1 input, 1 result kept";
     assert!(again.words.contains(made), "{}", again.words);
     assert_ne!(tree(&folder.join("out"))["m.Run.npy"], before["m.Run.npy"]);
     succeed(folder, &["check", "out"]);
@@ -255,7 +263,7 @@ fn a_result_keeps_its_name_when_another_input_appears_beside_it() {
     let expected = ["manifest.jsonl", "walk.dat.npy", "walk.tum.npy"];
     assert_eq!(names(&folder.join("full")), expected);
     let again = succeed(folder, &[&full[..], &["--resume"]].concat());
-    assert!(again.words.contains("2 results skipped"), "{}", again.words);
+    assert!(again.words.contains("2 results kept"), "{}", again.words);
 }
 
 /// A result is replaced if its input has changed, and not by that of another input of the same name.

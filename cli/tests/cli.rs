@@ -304,7 +304,7 @@ fn outputs_have_their_shapes_and_names() {
         ];
         run(folder.path(), &line).words
     };
-    assert!(parents("-1").contains("1 entries for 2 tracks"));
+    assert!(parents("-1").contains("has 1 where 2 are expected"));
     assert!(parents("1,0").contains("is its own ancestor"));
     assert!(parents("-2,0").contains("-2 is not the index of a track"));
     for (wrong, says) in [

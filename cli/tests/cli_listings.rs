@@ -125,7 +125,7 @@ fn info_lists_the_bodies_and_joints_of_robots() {
     let text = String::from_utf8(run.out).unwrap();
     let expected = [
         "robot              arm, mjcf",
-        "joints             2; hinges and slides have 2 values",
+        "joints             2; hinges and slides have 2 values in all",
         "poses              home",
         "1 relation between joints (<equality>) not applied",
         "0     0  base   fixed",

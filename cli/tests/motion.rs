@@ -84,14 +84,18 @@ fn a_file_of_several_animations_gives_several_results_that_are_checked_and_resum
     assert_eq!(run, fs::read(folder.join("run.npy")).unwrap());
     line(folder, "check out");
     let again = line(folder, "eval fox.gltf -o out/ --device cpu --resume");
-    let skipped = "2 results of 1 input skipped";
-    assert!(again.words.contains(skipped), "{}", again.words);
+    let kept = "2 results of 1 input kept";
+    assert!(again.words.contains(kept), "{}", again.words);
 
     // One of both is missing: the file is done again.
     fs::remove_file(folder.join("out/fox.Run.npy")).unwrap();
     refused(folder, "check out");
     let again = line(folder, "eval fox.gltf -o out/ --device cpu --resume");
-    assert!(!again.words.contains("skipped"), "{}", again.words);
+    assert!(
+        !again.words.contains("(already complete)"),
+        "{}",
+        again.words
+    );
     assert_eq!(names(&folder.join("out")), BTreeSet::from(all));
     assert_eq!(run, fs::read(folder.join("out/fox.Run.npy")).unwrap());
     line(folder, "check out");

@@ -77,7 +77,7 @@ fn a_dry_run_lists_results_and_writes_none() {
     let run = run_of("eval a.dat b.dat -o out --to csv -n --resume");
     assert_eq!(
         text(&run),
-        "a.dat → out/a.csv (complete, would be skipped)\nb.dat → out/b.csv\n"
+        "a.dat → out/a.csv (complete, would be kept)\nb.dat → out/b.csv\n"
     );
     assert_eq!(
         fs::read(folder.path().join("out/manifest.jsonl")).unwrap(),
@@ -120,16 +120,16 @@ fn a_dry_run_names_the_results_that_the_batch_then_makes_skips_and_removes() {
     assert_eq!(
         text(&dry).lines().collect::<Vec<_>>(),
         [
-            "in/a.dat → out/a.npy (complete, would be skipped)",
+            "in/a.dat → out/a.npy (complete, would be kept)",
             "in/c.dat → out/c.npy (made again: its input changed)",
             "in/d.dat → out/d.npy",
-            "in/m.gltf → out/m.Run.npy (complete, would be skipped)",
-            "in/m.gltf → out/m.Walk.npy (complete, would be skipped)",
+            "in/m.gltf → out/m.Run.npy (complete, would be kept)",
+            "in/m.gltf → out/m.Walk.npy (complete, would be kept)",
             "removes out/b.npy (its input is gone)",
         ]
     );
     let summary =
-        "2 results would be made, 3 skipped (already complete), 1 removed; nothing was written";
+        "2 results would be made, 3 kept (already complete), 1 removed; nothing was written";
     assert!(dry.words.contains(summary), "{}", dry.words);
     assert_eq!(tree(&folder.join("out")), before);
     let json = run_of("eval in -o out -n --resume --prune --json");
@@ -146,7 +146,7 @@ fn a_dry_run_names_the_results_that_the_batch_then_makes_skips_and_removes() {
     );
     // The batch does what was said.
     let done = run_of("eval in -o out --resume --prune");
-    let summary = "2 results made, 3 results of 2 inputs skipped (already complete)";
+    let summary = "2 results made, 3 results of 2 inputs kept (already complete)";
     assert!(done.words.contains(summary), "{}", done.words);
     assert!(!folder.join("out/b.npy").exists() && folder.join("out/d.npy").exists());
     // The reason is the one that applies.
@@ -295,7 +295,11 @@ fn results_are_named_by_paths_without_links() {
     assert!(!folder.path().join("out/latest").exists(), "{}", run.words);
     let said = "inputs/latest/a.dat: is the same file as inputs/shots/a.dat, and is processed once";
     assert!(run.words.contains(said), "{}", run.words);
-    assert!(run.words.contains("not read (.txt)"), "{}", run.words);
+    assert!(
+        run.words.contains("because of its ending (.txt)"),
+        "{}",
+        run.words
+    );
 }
 
 /// Equal files are different inputs as long as both exist.

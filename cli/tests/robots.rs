@@ -587,7 +587,7 @@ fn scalars_are_evaluated_alone() {
     assert!(run.words.contains("4 scalars"), "{}", run.words);
     assert!(
         run.words
-            .contains("left out: the rotations, the translations"),
+            .contains("left out: the rotations, the translations; -o"),
         "{}",
         run.words
     );

@@ -51,7 +51,7 @@ fn merged_shards_equal_one_process() {
         succeed(folder, &["check", &out]);
         let resumed = succeed(folder, &["eval", "walks", "-o", &out, "--resume"]);
         assert!(
-            resumed.words.contains("12 results skipped"),
+            resumed.words.contains("12 results kept"),
             "{}",
             resumed.words
         );
@@ -123,7 +123,7 @@ fn missing_shards_are_named_and_made() {
     fs::write(folder.join("out/01.npy"), "a lost worker's").unwrap();
     let resumed = succeed(folder, &["eval", "walks", "-o", "out", "--resume"]);
     assert!(
-        resumed.words.contains("4 results skipped"),
+        resumed.words.contains("4 results kept"),
         "{}",
         resumed.words
     );
@@ -158,7 +158,7 @@ fn resuming_looks_at_bytes() {
     let before = tree(&folder.join("out"));
     let again = succeed(folder, &shard("out", &bytes, "1/1", &["--resume"]));
     assert_eq!(
-        again.words.matches("4 results skipped").count(),
+        again.words.matches("4 results kept").count(),
         3,
         "{}",
         again.words
@@ -175,7 +175,7 @@ fn resuming_looks_at_bytes() {
     );
     let slerp = ["-m", "slerp", "--resume"];
     let made = succeed(folder, &shard("out", &bytes, "1/1", &slerp));
-    assert!(!made.words.contains("skipped"), "{}", made.words);
+    assert!(!made.words.contains("(already complete)"), "{}", made.words);
     succeed(folder, &["merge", "out"]);
     succeed(folder, &["eval", "walks", "-o", "one", "-m", "slerp"]);
     assert_eq!(tree(&folder.join("out")), tree(&folder.join("one")));

@@ -214,14 +214,18 @@ fn a_batch_of_paths_goes_on_where_it_stopped() {
     let first = result("a.npy");
     fs::remove_file(folder.path().join("poses/b.npy")).unwrap();
     let again = succeed(folder.path(), &words("follow paths -o poses --resume"));
-    assert!(again.words.contains("1 result skipped"), "{}", again.words);
+    assert!(again.words.contains("1 result kept"), "{}", again.words);
     assert_eq!(result("b.npy"), first, "the same path");
     // With other options, `follow` makes all results again.
     let other = succeed(
         folder.path(),
         &words("follow paths -o poses --resume --path-frame fixed"),
     );
-    assert!(!other.words.contains("skipped"), "{}", other.words);
+    assert!(
+        !other.words.contains("(already complete)"),
+        "{}",
+        other.words
+    );
     assert!(result("a.npy") != first);
     succeed(folder.path(), &words("check poses"));
 }

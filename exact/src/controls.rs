@@ -104,8 +104,8 @@ pub(crate) fn with_modes(module: &[u32], modes: &[Mode]) -> Result<Vec<u32>, Spi
     .concat())
 }
 
-/// The module without its `NoContraction` decorations, as a driver would compile it without the pass. With it a test can
-/// show that the pass has an effect.
+/// Removes the `NoContraction` decorations of a module, so that a driver compiles it as without the pass. A test needs
+/// such a module to show that the pass has an effect.
 ///
 /// # Errors
 /// A [`SpirvError`] for words that are no module.

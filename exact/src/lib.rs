@@ -3,8 +3,8 @@
 //! Vulkan requires correct rounding of `+ - *` on f32, but lets a driver fuse a multiplication with an addition and reorder
 //! sums. It defines division, roots and functions such as sine only within bounds. This crate
 //!
-//! * decorates the operations of a compute shader so that a driver must do them as written ([`exact`]), whatever compiled
-//!   it (naga, glslang, DXC, rust-gpu);
+//! * decorates the operations of a compute shader so that a driver must do them as written ([`exact`]), whichever
+//!   compiler made the shader (naga, glslang, DXC, rust-gpu);
 //! * finds the operations that Vulkan does not define to the last bit, with their lines ([`inexact`]);
 //! * adds the float controls that a device offers ([`float_controls`]), and takes the decorations away again for a
 //!   control experiment ([`without_decorations`]);
@@ -29,12 +29,12 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! The pass cannot see whether a driver obeys. Compare the results of a shader with those of the same operations in Rust, for
-//! which `f32` is exact; and do so without the decorations, too, because a comparison that never fails shows nothing. The
-//! engine `tumble` does both for its own kernels when it opens a device (`tumble devices`).
+//! The pass cannot see whether a driver obeys. Compare the results of a shader with those of the same operations on
+//! `f32` in Rust, which are exact. Compare also without the decorations, because a comparison that never fails shows
+//! nothing. The engine `tumble` does both for its own kernels when it opens a device (`tumble devices`).
 //!
-//! Drivers may flush subnormal numbers to zero, or keep them, and few say which. Keep numbers away from 2^-126, for
-//! example by [`functions::flushed`].
+//! Drivers may flush subnormal numbers to zero, or keep them, and few say which. Therefore keep every number either 0
+//! or much larger in magnitude than 2^-126, for example by [`functions::flushed`].
 
 mod controls;
 pub mod functions;

@@ -171,9 +171,9 @@ const FUNCTIONS: [&str; 81] = [
 /// The operations of a module whose results may differ from driver to driver, in their order. An empty list means that
 /// the pass accepts the module, except for products of vectors and scalars, which [`exact`](crate::exact) replaces.
 ///
-/// Exact are `+ - *` and the sign of f32, comparisons, selections, integers, bits, and moves of values. A float type of
-/// another width than 32 bits is listed once. Conversions of integers to f32 are accepted: they are exact below 2^24, and the
-/// shader has to see to that.
+/// These are exact: `+`, `-`, `*` and negation of f32, comparisons, selections, integers, bits, and moves of values. A
+/// float type of another width than 32 bits is listed once. Conversions of integers to f32 are not listed, although
+/// they are exact only for integers up to 2^24 in magnitude; the shader must not convert larger ones.
 ///
 /// # Errors
 /// A [`SpirvError`] for words that are no module.

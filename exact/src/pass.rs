@@ -1,4 +1,4 @@
-//! The pass: what makes a driver round each operation once, as written.
+//! The pass: it makes a driver round each operation once, as written.
 //!
 //! Compilers of shaders emit neither `NoContraction` nor the float-control execution modes unless they are asked to. Without
 //! them a driver may fuse a multiplication with an addition, or rewrite `(a + b) - a` to `b`. The pass decorates every float
@@ -41,13 +41,15 @@ pub enum PassError {
     },
 }
 
-/// The whole pass for a module of any compiler: [`splat_products`] and [`no_contraction`].
+/// Decorates a module of any compiler so that a driver must round each operation once, as written: [`splat_products`],
+/// then [`no_contraction`].
 ///
-/// Add the modes of a device by [`float_controls`](crate::float_controls) when the module is loaded on it.
+/// When the module is loaded on a device, add the float controls of the device by
+/// [`float_controls`](crate::float_controls).
 ///
 /// # Errors
-/// A [`PassError`] for words that are no module, and for a module that computes anything whose last bit Vulkan leaves
-/// open.
+/// * [`PassError::Spirv`] when the words are no SPIR-V module.
+/// * [`PassError::Inexact`] when the module has an operation whose last bit Vulkan leaves open.
 pub fn exact(module: &[u32]) -> Result<Vec<u32>, PassError> {
     no_contraction(&splat_products(module)?)
 }
@@ -56,14 +58,15 @@ pub fn exact(module: &[u32]) -> Result<Vec<u32>, PassError> {
 /// `NoContraction`.
 ///
 /// # Errors
-/// A [`PassError`] for words that are no module, and for a module that computes
-/// anything whose last bit Vulkan leaves open.
+/// * [`PassError::Spirv`] when the words are no SPIR-V module.
+/// * [`PassError::Inexact`] when the module has an operation whose last bit Vulkan leaves open.
 pub fn no_contraction(module: &[u32]) -> Result<Vec<u32>, PassError> {
     decorated(module, HalfFloats::Refused)
 }
 
-/// As [`no_contraction`], for a module that converts f32 to half precision. It gets the modes by which conversions round
-/// to nearest, ties to even, and keep subnormal numbers, so that only devices that report both may have it.
+/// As [`no_contraction`], for a module that converts f32 to half precision. The result requires modes by which
+/// conversions round to nearest, ties to even, and keep subnormal numbers, so only devices that report both modes can
+/// use the result.
 ///
 /// # Errors
 /// As for [`no_contraction`].
@@ -192,7 +195,8 @@ pub fn workgroup_layouts(module: &[u32]) -> Result<Vec<u32>, PassError> {
     // RowMajor, ColMajor, ArrayStride, MatrixStride, Offset
     const LAYOUT: [u32; 5] = [4, 5, 6, 7, 35];
     let code = instructions(module)?;
-    // The parts of a type are declared before it, and pointers to it after it.
+    // SPIR-V declares the parts of a type before the type, and pointers to the type after it, so one pass over the
+    // module is enough.
     let mut parts = BTreeMap::<u32, &[u32]>::new();
     let (mut shared, mut laid_out) = (BTreeSet::new(), BTreeSet::new());
     for instruction in &code {

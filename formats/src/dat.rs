@@ -15,7 +15,7 @@ use std::path::Path;
 
 use glam::{DQuat, Quat};
 
-use crate::diagnostic::{Code, Diagnostic};
+use crate::diagnostic::{Code, Diagnostic, counted};
 use crate::feature::Feature;
 use crate::format::{Format, FormatOption, Loaded, ReadOptions};
 use crate::motion::Motion;
@@ -153,8 +153,7 @@ fn check_comment<R: BufRead>(lines: &Lines<R>, line: &str) -> Result<(), Diagnos
         .map(|(_, token)| number::parse(token))
         .collect();
     if words.len() == 2 && words.iter().all(Result::is_ok) {
-        let message =
-            "a second header; split the file, or make this line a comment by adding words";
+        let message = "a second header; split the file, or delete this line";
         return Err(lines.refuse(1, Code::SecondHeader, message.to_owned()));
     }
     Ok(())
@@ -212,8 +211,8 @@ impl DatKeys {
 
     fn read_row<R: BufRead>(&mut self, lines: &mut Lines<R>, line: &str) -> Result<(), Diagnostic> {
         if let Some(blank) = self.blank.take() {
-            let message = format!("line {blank} is blank; it is skipped");
-            lines.warn(1, Code::BlankLine, message);
+            let message = "a blank line between keys; it is ignored";
+            lines.warn_line(blank, Code::BlankLine, message);
         }
         self.read_numbers(lines, line).or_else(|error| {
             // A wrong number of columns is reported first, because it explains more.
@@ -258,9 +257,8 @@ impl DatKeys {
         if found == expected {
             return Ok(());
         }
-        let message = format!(
-            "{found} numbers where {expected} are expected: a time and 4 for each of {boxes} boxes"
-        );
+        let numbers = counted(found, "number", "numbers");
+        let message = format!("{numbers} where {expected} are expected: a time and 4 for each box");
         let column = extra.unwrap_or(line.trim_end().len() as u64 + 1);
         Err(lines.refuse(column, Code::Columns, message))
     }

@@ -5,6 +5,12 @@ use std::fmt;
 
 use crate::printable::printable;
 
+/// `1 number`, `4 numbers`; `plural` is the word for all numbers but 1.
+pub(crate) fn counted(number: usize, singular: &str, plural: &str) -> String {
+    let noun = if number == 1 { singular } else { plural };
+    format!("{number} {noun}")
+}
+
 /// Whether an input is refused, or read with a warning.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Severity {
@@ -152,7 +158,7 @@ codes! {
     Open = "E001" elsewhere, "the input cannot be read", "The system could not open or read it; the message contains the system's reason.";
     NotAFile = "E002" elsewhere, "not a file", "Directories, sockets and devices cannot be read as files. A named pipe is read only with `--pipes`; `-` reads standard input.";
     Changed = "E003" elsewhere, "the file changed while it was read", "Its length or its modification time changed during reading. Try again when the other program has finished writing.";
-    OtherFormat = "E004", "another format", "The first bytes or the name belong to a kind of file that is not read. The message names the kind and explains how to convert the file.";
+    OtherFormat = "E004", "another format", "The first bytes or the name belong to a kind of file that is not read, or not in the requested format. The message names the kind and says how to read or convert the file.";
     Encoding = "E005", "not plain text", "A `.dat` file is ASCII or UTF-8 text; UTF-16, NUL bytes and invalid UTF-8 are refused.";
     Character = "E006", "a character that does not belong", "Lines of numbers contain only printable ASCII, blanks and tabs. No-break spaces, form feeds and single carriage returns are refused because editors hide them.";
     LineTooLong = "E007" elsewhere, "a line is too long", "Lines of keyframe data are never this long; the file is probably of another kind.";
@@ -166,16 +172,16 @@ codes! {
     SecondHeader = "E016", "a second header", "A file has one header, then keys. If the file contains several recordings, split it.";
     Columns = "E020", "the wrong number of columns", "A key line has a time and four numbers for each box: `time w x y z w x y z …`.";
     Number = "E021", "not a number", "Numbers are decimal, with a point, and may have an exponent: `-1.25e-3`.";
-    NotFinite = "E022", "not finite", "NaN and infinity are neither rotations nor times.";
+    NotFinite = "E022", "not finite", "NaN and infinity are neither rotations nor times. Repair the key, or remove it.";
     TooLarge = "E023", "too large for f32", "Keys are kept in f32, whose largest value is 3.4e38.";
     TokenTooLong = "E024", "a number is too long", "No number needs more than 64 characters.";
     Norm = "E025", "not a unit quaternion", "A rotation is a quaternion of norm 1. Norms within 0.1 of 1 are normalised. Other norms are probably a mistake, such as a missing column.";
     TimeNotIncreasing = "E026", "times do not increase", "Key times must increase strictly from line to line. If the lines are only out of order, sort them by time: `sort -g -k 1,1 FILE`, or `sort -g -t , -k 1,1 FILE` for columns with commas. If the clock was set back, the file has two recordings. The times of samples (`--times`) must increase too if a clip is written.";
     KeyNorm = "E027", "no rotation", "The norm of a key's quaternion is below 1e-6, so it does not determine a rotation.";
     EqualTimes = "E028", "two keys at one time", "Two keys at the same time have different values. `--duplicates first` or `last` keeps one of them, `both` makes a jump.";
-    LargeSeconds = "E029" elsewhere, "times too large for seconds", "In CSV, Parquet, Arrow and TUM files and in KITTI's files of times, such large numbers are read as milliseconds, microseconds or nanoseconds since 1970 (W305). So they are not written to these formats. `--time-unit` states the unit of the input's times.";
+    LargeSeconds = "E029" elsewhere, "times too large for seconds", "In CSV, Parquet, Arrow and TUM files and in KITTI's files of times, times of 1e11 and more are read as milliseconds, microseconds or nanoseconds since 1970 (W305). So such times are not written to these formats as seconds. `--time-unit` states the unit of the input's times.";
     Time = "E030" elsewhere, "not a list of times", "A list of times has finite numbers of seconds, separated by blanks, commas or line ends.";
-    Map = "E032" elsewhere, "not a map of arrays or columns", "`--map` defines the meaning of arrays or columns: entries `name=source[3:7]:order`, separated by commas. Each source must be in the file, and each entry must have an effect.";
+    Map = "E032" elsewhere, "not a map of arrays or columns", "`--map` defines the meaning of arrays or columns: entries `name=source[3:7]:representation`, separated by commas, such as `hand=state[3:7]:wxyz`. Each source must be in the file, and each entry must have an effect.";
     Memory = "E034", "more memory than is allowed for its length", "Reading an input may take 64 times its length plus 64 MiB (`--max-memory`). This one would take more. Causes: a wrong count, compressed data, or parts that refer to the same part many times.";
     // E1xx and W1xx: glTF.
     Glb = "E100", "not a whole GLB", "A GLB has a header with its length, a JSON chunk, and complete chunks after it.";
@@ -184,7 +190,7 @@ codes! {
     Property = "E103", "an invalid property", "It is missing, given twice, or does not have the type that glTF 2.0 requires.";
     NoAnimations = "E104", "no animations", "The file contains no animation.";
     IndexRange = "E105", "an index out of range", "Parts of a glTF file refer to each other by index; this index does not exist.";
-    NodeTree = "E106", "nodes that are not a tree", "A node must have at most one parent and must not be among its ancestors.";
+    NodeTree = "E106", "nodes that are not a tree", "A node must have at most one parent, and must not be its own ancestor.";
     Uri = "E107", "a URI that is not followed", "Data is read from the file itself and from files in its folder and below, named by relative URIs; nothing is fetched from a network.";
     TooShort = "E108", "fewer bytes than needed", "A buffer, a buffer view or an accessor needs more bytes than there are; the file may be truncated.";
     AccessorType = "E109", "an accessor of the wrong type", "Times are floats. Rotations are four floats or normalized integers, translations and scales three, weights of morph targets one.";
@@ -222,9 +228,9 @@ codes! {
     ArrayHeader = "E305", "not an NPY array", "An array begins with `\\x93NUMPY`, a version, and a header with its type, order and shape.";
     Pickled = "E306" elsewhere, "pickled Python objects", "An array of numbers or texts is needed here, and this one holds objects. Save numbers and texts as arrays of plain types.";
     ArraySize = "E307", "an array of the wrong size", "The number of bytes after the header differs from the number that the shape and the type in the header require.";
-    ElementType = "E308", "an array of the wrong type", "Keys and vectors must be floats (f2, f4, f8), rates and parents numbers, names text.";
+    ElementType = "E308", "an array of the wrong type", "Keys and vectors must be floats (float16, float32 or float64, which NumPy's headers call f2, f4 and f8), rates and parents numbers, names text.";
     Shape = "E309", "an array of the wrong shape", "All arrays of a clip must have the same number of frames and of tracks, at least one of each.";
-    UnknownArrays = "E310", "arrays of unknown names", "Three layouts are recognised by the names of their arrays: motion of SMPL bodies (`poses`), body poses in world space (`body_rotations`), and Tumble's layout (`rotations`). For other files, define the arrays with `--map`.";
+    UnknownArrays = "E310", "arrays of unknown names", "Layouts are recognised by the names of their arrays: motion of SMPL bodies (`poses`), body poses in world space (`body_rotations`), Tumble's layout (`rotations`), and those of programs for robots (docs/robots.md). For other files, define the arrays with `--map`.";
     NoRate = "E311", "no times", "The file has neither times nor a frame rate, or the unit of its times is not known. Give the rate by `--source-fps` or the unit by `--time-unit`.";
     FrameRate = "E312", "not a frame rate", "A rate is one number of frames per second, greater than 0.";
     Ambiguous = "E313", "tracks and frames cannot be distinguished", "Two axes of the array may be the frames. `--map` selects one.";
@@ -240,7 +246,7 @@ codes! {
     TableClaims = "E402", "more than the file can contain", "The file states more rows or bytes than its length can contain; nothing was read.";
     Compression = "E403", "a compression that is not read", "Parquet is read uncompressed and with snappy, zstd and LZ4, Arrow uncompressed and with zstd and LZ4.";
     NoRotations = "E404", "no rotations among the columns", "Rotations are the columns `x y z w` (a row for each key), `knee.x knee.y knee.z knee.w` (a row for each time), or a part of a list that --map names.";
-    NoTimes = "E405", "no times among the columns", "Times are a column `time`, `timestamp` or `t`, or `frame_index` with --source-fps; --map time=NAME names another. In CSV, commas separate columns, and the first line names them.";
+    NoTimes = "E405", "no times among the columns", "Times are a column `time`, `timestamp` or `t`, or `frame_index` with --source-fps; --map time=NAME names another. In CSV, commas must separate the columns, and the first line must name them; a file with semicolons or tabs, or without names, has no such column.";
     ColumnMissing = "E406", "a column is missing", "A column that `--map` names does not exist, or a group of columns such as `tx ty tz` is not complete.";
     ColumnTwice = "E407", "two columns of one name", "It is not clear which of them is meant; rename one.";
     ColumnType = "E408", "a column of another type", "Rotations, translations and scales are numbers, names are text or whole numbers, times are numbers or timestamps.";
@@ -251,12 +257,12 @@ codes! {
     SeveralClips = "E413" elsewhere, "several clips for one table", "A table with a row for each time contains one clip. Write the clips to separate files, or as Parquet.";
     ColumnsAmbiguous = "E414", "columns of two meanings", "The columns `x y z` may belong to a quaternion `x y z w`, or to a position if the quaternion's columns have numbers after their names (`x_1`, `x.1`). Select one with `--map`.";
     // E5xx and W5xx: trajectories.
-    TumPose = "E501", "not a pose", "A line has eight numbers: `t x y z qx qy qz qw`.";
-    TumTime = "E502", "a time out of range", "Times are seconds, up to 1e14 before or after 0.";
+    TumPose = "E501", "not a pose with a time", "A line has eight numbers: `t x y z qx qy qz qw`.";
+    TumTime = "E502", "a time out of range", "Times in seconds are at most 1e14 in magnitude. A first time from 1e11 on is taken for another unit (W305).";
     TumEmpty = "E503", "no poses", "All lines are blank or comments.";
     TumWrite = "E504" elsewhere, "a clip that a trajectory cannot store", "A trajectory has one clip with one track, whose times must differ after rounding to the format's precision. KITTI does not store times; poses that are not at frames of a rate need a separate file of times, `--times-out`, in Python `times_out`.";
-    KittiPose = "E505" elsewhere, "not a pose", "A line has twelve numbers: the three rows of a matrix, a rotation and a translation. A fourth row `0 0 0 1` is allowed. A frame number before them, as in KITTI-360, is not: remove it, and give the times of the frames by `--source-times`, in Python `source_times`.";
-    NoRotation = "E506" elsewhere, "a matrix that is not a rotation", "The rows of a rotation matrix have length 1 and are orthogonal, and its determinant is 1.";
+    KittiPose = "E505" elsewhere, "not a pose of KITTI", "A line has twelve numbers: the three rows of a matrix, a rotation and a translation. A fourth row `0 0 0 1` and further numbers after them are allowed, if all lines have as many.";
+    NoRotation = "E506" elsewhere, "a matrix that is not a rotation", "The rows of a rotation matrix have length 1 and are orthogonal, and its determinant is 1. In files of KITTI-360, a frame number before the matrix causes this error: remove it, and give the times of the frames by `--source-times`, in Python `source_times`.";
     FrameTimes = "E507" elsewhere, "not a time for each pose", "A file of times has one number on each line, the time of a pose in seconds, in the order of the poses.";
     // E6xx: paths.
     Path = "E601" elsewhere, "not a path", "A path is CSV with the header `t,x,y,z,ux,uy,uz`, where `t` and `ux,uy,uz` are optional, or NPY of shape (tracks, points, 3). An upward direction must not be 0; its cells may be blank.";
@@ -307,14 +313,14 @@ codes! {
     Gap = "W010", "an unusual gap between times", "The gap is shorter than 1e-9 s or longer than 1e9 s. Perhaps the times are not in seconds.";
     OneKey = "W011", "only one key", "Nothing moves.";
     HalfTurn = "W012", "neighbouring keys 180° apart", "Both directions of rotation are equally long; the stored signs decide.";
-    EqualKeys = "W013", "a key given twice", "Two keys at one time with equal values; the second is dropped.";
+    EqualKeys = "W013", "a key given twice", "Two keys at one time with equal values; the second is left out.";
     AccelerationJumps = "W014" elsewhere, "an angular acceleration that jumps", "With the method `c2` the angular acceleration is continuous, except at these keys: no such curve was found, or it would rotate many times between two keys. There only the velocity is continuous. The usual cause is a very short interval next to a very long one. Add keys in the long interval, or use `-m bessel-overhauser`.";
     RequiredExtension = "W100", "an unknown required extension", "The animations are read without it; data that needs it is refused.";
     CubicOfOne = "W101", "a cubic of one key", "There is nothing to interpolate; the value is constant.";
     EmptySampler = "W102", "a sampler without keys", "Its target is not animated.";
     NothingMoved = "W103", "an animation that moves no node", "It has no channels, or only those of properties that are not read, such as materials; it is kept as it is.";
     NodeMatrix = "W104", "an animated node with a matrix", "glTF requires translation, rotation and scale for animated nodes. The matrix is decomposed into these.";
-    Shear = "W105", "a matrix that shears", "It cannot be decomposed exactly into translation, rotation and scale. An approximation is used, and world poses are refused.";
+    Shear = "W105", "a matrix that shears", "It cannot be decomposed exactly into translation, rotation and scale. They approximate it, and world poses are refused.";
     NegativeTime = "W106", "a negative time", "glTF has no negative times; players may not show this part.";
     ByteStride = "W107", "a stride in animation data", "glTF allows a stride only for vertices. It is used anyway.";
     BufferLong = "W108", "a buffer longer than it says", "Bytes after the stated length are not read.";
@@ -325,7 +331,7 @@ codes! {
     BvhMoreRows = "W201", "more rows than frames", "The rows after the last frame are left out.";
     BvhNoFrames = "W202", "no frames", "The skeleton does not move.";
     EndSiteRounded = "W203", "an End Site that f32 rounds", "An End Site is the end of a last bone, relative to its joint. End Sites are stored in f32, with about 7 digits. Offsets of joints and positions keep all digits.";
-    StartMoved = "W204" elsewhere, "the start is moved to 0", "BVH and SMPL files have no start time; their first frame is at 0 s. glTF stores times in f32, which cannot distinguish frames in seconds since 1970; times are counted from the first whole second.";
+    StartMoved = "W204" elsewhere, "times are shifted", "BVH and SMPL files have no start time, so the first frame is at 0 s. glTF stores times in f32, which cannot distinguish frames in seconds since 1970, so times are counted from the first whole second.";
     SameName = "W206", "two joints of one name", "A number is appended to the second name, so that names are unique. Braces and control characters in names are replaced by `_`.";
     NameChanged = "W207" elsewhere, "a name is changed", "The format does not allow line ends, braces or control characters in names, nor two equal names.";
     NoRoom = "W208" elsewhere, "data that the format cannot store", "It is left out. The table in docs/formats.md shows what each format can store.";
@@ -349,7 +355,7 @@ codes! {
     FbxProperties = "W702", "curves of other properties", "They animate something other than a transform, such as blend shapes, visibility or a lens.";
     FbxOutside = "W703", "keys outside the take", "An animation stack has a start and an end. Some curves have keys outside, which a player does not show.";
     FbxScaleNodes = "W704", "nodes that carry scales", "In FBX, children may not inherit the scale of a node. If this changes the result, an additional node has the scale.";
-    FbxWild = "W705", "a curve that is not followed", "Between two keys it changes so fast that even a thousand times as many keys do not approximate it within the tolerance.";
+    FbxWild = "W705", "a curve that is not followed", "Between two keys of the file, it would need more than 4096 keys, or it changes within less than 1e-7 s. There it is only approximated.";
     FbxRests = "W706", "a stack that moves nothing", "It has no curves of nodes, or is a pose: each curve has one key. Nothing moves.";
     FbxOdd = "W707", "a problem that was corrected", "The library that reads FBX found a problem and corrected it.";
     FbxSpheric = "W708", "the spheric rotation order", "A node has the rotation order 6 (eSphericXYZ). Its angles are read as those of the order XYZ, as Autodesk's SDK does.";
@@ -368,9 +374,9 @@ codes! {
     RestingJoints = "W913" elsewhere, "joints without keys", "The robot of `--robot` has joints for which the file has no values. They stay where the robot's file has them.";
     OtherRobot = "W914" elsewhere, "bodies that are not where their joints put them", "The poses of bodies in the file differ from those that follow from its joints and the robot of `--robot`. The file may belong to another version of the robot. Bodies are computed from the joints.";
     AngleJumps = "W915" elsewhere, "angles that jump by more than half a turn", "Between two keys an angle changes by more than half a turn. The program that wrote the file may have wrapped angles to one turn. The angle is interpolated as stored, the long way around. `--robot` unwraps hinges without limits; otherwise unwrap the angles first (numpy.unwrap).";
-    FollowingJoints = "W916" elsewhere, "joints that follow others", "In the robot's file, the joint follows another joint (`mimic`): its value is that of the other joint times a factor, plus an offset. This value is computed and used instead of the values in the file; the message has the largest difference between both.";
+    FollowingJoints = "W916" elsewhere, "joints that follow others", "In the robot's file, the joint follows another joint (`mimic`): its value is that of the other joint times a factor, plus an offset. This value is computed and used instead of the values in the file; the message has the largest difference between the two.";
     RotationsDropped = "W917" elsewhere, "rotations of joints that are lost", "Joints of the input move, but no joint of the target follows them. `tumble retarget` pairs the parts of the body, and other joints with the same name and the same joints above them. `--bones` pairs further joints by name.";
-    CoarseAngles = "W918" elsewhere, "angles in coarse steps", "Keys are f32, whose steps grow with the number: 6e-5 rad at 512 rad, 5e-4 rad at 5 000 rad. An angle that was unwrapped counts from whole turns near the middle of its range, so half of its range decides. Where this matters, cut the file into shorter ones: each counts from its own middle. Velocities of such angles have errors of about one step per interval between keys.";
+    CoarseAngles = "W918" elsewhere, "angles in coarse steps", "Keys are f32, whose steps grow with the number: 6e-5 rad at 512 rad, 5e-4 rad at 5 000 rad. Unwrapped angles are stored relative to a whole number of turns near the middle of their range, so an angle that grows to 10 000 rad has the steps of 5 000 rad. Where this matters, cut the file into shorter ones: each counts from its own middle. Velocities of such angles have errors of about one step per interval between keys.";
     OtherScalars = "W919" elsewhere, "scalars that are no joints of the robot", "The scalars of the file are in groups, such as `observation.state.` and `action.` of LeRobot, and the names of one group are those of the robot's joints. The others are left out. If a joint is in two groups, one of states and one of actions, the states count: the actions are what was commanded.";
 }
 

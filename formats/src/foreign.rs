@@ -44,12 +44,12 @@ const ALL: [Foreign; 26] = [
     Foreign {
         extensions: &[],
         begins: &[b"\x93NUMPY"],
-        description: "NPY; export the keys as text",
+        description: "NPY; save its keys and their times as NPZ (numpy.savez)",
     },
     Foreign {
         extensions: &[],
         begins: &[b"HIERARCHY"],
-        description: "BVH motion capture; convert its rotations",
+        description: "BVH motion capture; read it with --from bvh",
     },
     Foreign {
         extensions: &["xml", "urdf", "mjcf", "xacro", "dae"],
@@ -60,7 +60,7 @@ const ALL: [Foreign; 26] = [
     Foreign {
         extensions: &[],
         begins: &[b"glTF"],
-        description: "binary glTF; convert its rotation tracks",
+        description: "binary glTF; read it with --from glb",
     },
     Foreign {
         extensions: &["usd", "usda", "usdc", "usdz"],
@@ -80,7 +80,7 @@ const ALL: [Foreign; 26] = [
     Foreign {
         extensions: &["json"],
         begins: &[b"{"],
-        description: "JSON, perhaps glTF; convert its rotation tracks",
+        description: "JSON; if it is glTF, read it with --from glb",
     },
     Foreign {
         extensions: &["trc"],

@@ -10,7 +10,7 @@ use glam::{DMat3, DQuat, DVec3};
 use tumble::FrameRate;
 
 use crate::decimal::{Decimal, decimal_count};
-use crate::diagnostic::{Code, Diagnostic};
+use crate::diagnostic::{Code, Diagnostic, counted};
 use crate::feature::Feature;
 use crate::format::{
     Format, FormatOption, Loaded, MotionOptions, ReadOptions, TimeUnit, WriteError,
@@ -196,8 +196,9 @@ fn read_rows<R: BufRead>(
             NUMBERS => "",
             _ => ", and those after the first pose",
         };
+        let numbers = counted(found, "number", "numbers");
         let message =
-            format!("{found} numbers where {expected} are expected: three rows of a matrix{after}");
+            format!("{numbers} where {expected} are expected: three rows of a matrix{after}");
         return Err(lines.refuse(column, Code::KittiPose, message));
     }
     let mut rows = [[0.0; 4]; 3];
@@ -223,7 +224,8 @@ fn read_rows<R: BufRead>(
         .any(|warning| warning.code == Code::FurtherNumbers);
     if !is_known && !after.is_empty() && after != FOURTH_ROW {
         let column = tokens(line).nth(NUMBERS).map_or(1, |(at, _)| at);
-        let message = format!("{} numbers after each pose are left out", after.len());
+        let further = counted(after.len(), "number", "numbers");
+        let message = format!("left out: {further} after each pose");
         lines.warn(column, Code::FurtherNumbers, message);
     }
     Ok(rows)

@@ -211,12 +211,16 @@ impl Motion {
         }
     }
 
+    /// Whether any track has keys of a channel.
+    #[must_use]
+    pub fn has_keys_of(&self, channel: Channel) -> bool {
+        (0..self.set.track_count()).any(|track| self.set.vector_keys(channel, track).is_some())
+    }
+
     /// Whether any track has keys of translations or scales.
     #[must_use]
     pub fn has_vectors(&self) -> bool {
-        let channels = [Channel::Translation, Channel::Scale];
-        let keyed = |track| channels.map(|it| self.set.vector_keys(it, track).is_some());
-        (0..self.set.track_count()).any(|track| keyed(track).contains(&true))
+        self.has_keys_of(Channel::Translation) || self.has_keys_of(Channel::Scale)
     }
 
     /// Whether the tracks are boxes of a chain: rotations alone, without a skeleton, positions or scalars.

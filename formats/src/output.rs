@@ -488,8 +488,8 @@ impl Temporary {
             }
             Self::Named { file, name } => {
                 name.rename(to, overwrite)?;
-                // It may still have a writer, but its name is not looked up any more. On Windows, other processes
-                // cannot read a locked file.
+                // The file may still have a writer, but nobody opens it by its name any more, so the lock has no use.
+                // On Windows, other processes cannot read a locked file.
                 let _ = file.unlock();
                 Ok(file)
             }
@@ -539,7 +539,8 @@ impl Write for Temporary {
 fn named_in(parent: &Folder, mark: &str) -> io::Result<Temporary> {
     loop {
         let (name, file) = TemporaryName::new(parent, mark, |name| parent.create_new(name))?;
-        // Another process that removes abandoned files may have found it before it was locked.
+        // Before the lock was taken, a process that removes abandoned files may have removed the file; then a new one
+        // is made.
         let is_locked = matches!(file.try_lock(), Err(fs::TryLockError::WouldBlock));
         if !is_locked && is_there(&file) {
             return Ok(Temporary::Named { file, name });

@@ -57,9 +57,9 @@ impl Precision {
 
 /// The information about its rate in a file.
 pub(crate) enum RateSource<'a> {
-    /// The times of its keys, seconds: a list for each track or channel.
+    /// The times of its keys in seconds: a list for each track or channel.
     Times(&'a [Vec<f64>], Precision),
-    /// The digits of a frame's time, seconds.
+    /// The digits of a frame's time in seconds.
     FrameTime(&'a str),
     /// The frames of a second.
     Number(f64),

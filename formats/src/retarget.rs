@@ -81,7 +81,7 @@ pub struct RetargetReport {
     pub resting: Vec<String>,
     /// Joints of the source that nothing follows.
     pub dropped: Vec<String>,
-    /// The dropped joint that rotates furthest from its rest pose, and this angle, degrees; `None` if all rest.
+    /// The dropped joint that rotates furthest from its rest pose, and this angle in degrees; `None` if all rest.
     pub furthest_dropped: Option<(String, f64)>,
     /// By how many degrees the rest pose of each joint of the target was aligned, where it was.
     pub aligned: Vec<(String, f64)>,
@@ -93,7 +93,8 @@ pub struct RetargetReport {
     pub are_axes_assumed: bool,
     /// How far a joint of the source other than the hips moves away from where it rests, in its unit, which is lost.
     pub dropped_translation: f64,
-    /// The largest angle between the differences from rest of a joint and its partner, radians: that of rounding.
+    /// The largest angle in radians between the differences from rest of a joint and of its partner, caused by
+    /// rounding.
     pub largest_difference: f64,
     /// How far hands and feet come away from where the source's are, relative to the hips and to the height of the hips: by
     /// the names of the target's joints. Empty where a skeleton is not recognised.

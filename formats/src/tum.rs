@@ -9,7 +9,7 @@ use glam::{DQuat, DVec3, Quat};
 use tumble::{TrackError, TrackSet};
 
 use crate::decimal::{Decimal, decimal_count, offset_of};
-use crate::diagnostic::{Code, Diagnostic, Location};
+use crate::diagnostic::{Code, Diagnostic, Location, counted};
 use crate::feature::Feature;
 use crate::format::{
     Format, FormatOption, Loaded, MotionOptions, ReadOptions, TimeUnit, WriteError,
@@ -167,7 +167,8 @@ impl TrajectoryPoses {
     ) -> Result<(), Diagnostic> {
         let found = tokens(line).count();
         if self.columns == 0 && found > 8 && !has_decimal_commas(original) {
-            let message = format!("{} numbers after each pose are left out", found - 8);
+            let further = counted(found - 8, "number", "numbers");
+            let message = format!("left out: {further} after each pose");
             lines.warn(
                 tokens(line).nth(8).map_or(1, |(at, _)| at),
                 Code::FurtherNumbers,
@@ -186,7 +187,8 @@ impl TrajectoryPoses {
                 ""
             };
             let message = format!(
-                "{found} numbers where {columns} are expected: {}{more}",
+                "{} where {columns} are expected: {}{more}",
+                counted(found, "number", "numbers"),
                 format.numbers
             );
             return Err(lines.refuse(column, Code::TumPose, message));

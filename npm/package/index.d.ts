@@ -58,7 +58,7 @@ export interface Result {
   tracks: number;
   /** The number of samples of each track. */
   samples: number;
-  /** The times of the frames, seconds; only if frames were requested. */
+  /** The times of the frames in seconds; only if frames were requested. */
   times?: Float64Array;
 }
 
@@ -143,9 +143,9 @@ export class Clip {
   readonly parents: readonly (number | null)[];
   /** Whether rotations and translations are relative to the world instead of the parent. */
   readonly isWorld: boolean;
-  /** The first key, seconds. */
+  /** The time of the first key in seconds. */
   readonly start: number;
-  /** The last key, seconds. */
+  /** The time of the last key in seconds. */
   readonly end: number;
   readonly keyCount: number;
   /** The rate on whose frames all keys lie, if there is one. */
@@ -175,7 +175,7 @@ export class Clip {
 export class Sampler {
   private constructor();
   readonly tracks: number;
-  /** `x y z w` of every track at a time, seconds. `out`: an array of 4 × tracks numbers that is filled and returned. */
+  /** `x y z w` of every track at `time`, which is in seconds. `out`: an array of 4 × tracks numbers that is filled and returned. */
   pose(time: number, out?: Float32Array): Float32Array;
   /** `x y z w` of a track, which counts from 0. */
   sample(track: number, time: number, out?: Float32Array): Float32Array;

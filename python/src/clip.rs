@@ -28,11 +28,11 @@ use crate::errors::expected;
 /// Unix times are stored relative to the clip's `time_offset`, the whole second before the first key, so that no digits
 /// are lost. `at`, `start` and `end` accept both.
 ///
-/// For each track: `names`, text; `parents`, the index of its parent track (`None` or -1 for a root);
-/// `offsets`, `(tracks, 3)`, where it rests in its parent's frame. For each key, as arrays or lists
-/// like `keys` with 3 components instead of 4: `translations`, `scales`, and what some methods use:
-/// `velocities` (rad/s, body frame; `hermite`), `tangents` (`(…, 2, 4)`, arriving and leaving, a
-/// second; `gltf-cubic`), `tcb` (tension, continuity, bias; `kochanek-bartels`).
+/// For each track: `names`, text; `parents`, the index of its parent track (`None` or -1 for a root); `offsets`,
+/// `(tracks, 3)`, where it rests in its parent's frame. For each key, as arrays or lists like `keys` with 3 components
+/// instead of 4: `translations`, `scales`, and what some methods use: `velocities` (rad/s, body frame; `hermite`),
+/// `tangents` (`(…, 2, 4)`, before and after each key, per second; `gltf-cubic`), `tcb` (tension, continuity, bias;
+/// `kochanek-bartels`).
 ///
 /// `scalars` are numbers over time beside the tracks, such as the angles of a robot's joints: a dict with a pair
 /// `(times, keys)` for each name.

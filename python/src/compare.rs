@@ -108,7 +108,7 @@ pub(crate) struct ChannelDifference {
     largest: f64,
     /// The name of the track with the largest difference.
     track: String,
-    /// The time of the largest difference, seconds, on the clock of the first clip.
+    /// The time of the largest difference in seconds, on the clock of the first clip.
     time: f64,
     /// The frame of the largest difference, counted in the first clip from 0 at its first key; None if it has no rate.
     frame: Option<f64>,
@@ -156,7 +156,7 @@ impl ChannelDifference {
 pub(crate) struct JointDifference {
     /// The name of the track.
     track: String,
-    /// The differences of rotations, degrees.
+    /// The differences of rotations in degrees.
     rotation: ChannelDifference,
     /// The differences of translations, as lengths; None if neither clip has translations.
     translation: Option<ChannelDifference>,
@@ -233,11 +233,11 @@ pub(crate) struct ClipDifference {
     missing: (Vec<String>, Vec<String>),
     /// The number of samples of each track.
     samples: usize,
-    /// The first and the last time, seconds.
+    /// The first and the last time in seconds.
     span: (f64, f64),
     /// The number of rotations whose bits are the same.
     identical: u64,
-    /// The differences of rotations, degrees.
+    /// The differences of rotations in degrees.
     rotation: ChannelDifference,
     /// The differences of translations, as lengths; None if neither clip has translations.
     translation: Option<ChannelDifference>,
@@ -284,7 +284,7 @@ pub(crate) struct PathStatistics {
     mean: f64,
     /// The median.
     median: f64,
-    /// The deviation from the mean.
+    /// The standard deviation.
     std: f64,
     /// The smallest.
     min: f64,
@@ -341,7 +341,7 @@ pub(crate) struct PathErrors {
     outside: usize,
     /// The number of poses that are not compared because they are in gaps of the other clip.
     in_gaps: usize,
-    /// First and last time, seconds.
+    /// First and last time in seconds.
     span: (f64, f64),
     /// The scale of the alignment. The alignment scales the estimate, then rotates it, then translates it.
     scale: f64,
@@ -351,11 +351,11 @@ pub(crate) struct PathErrors {
     translation: [f64; 3],
     /// Absolute errors of the positions, lengths.
     ape_translation: PathStatistics,
-    /// Absolute errors of the rotations, degrees.
+    /// Absolute errors of the rotations in degrees.
     ape_rotation: PathStatistics,
     /// Relative errors of the positions, lengths; None without `rpe`.
     rpe_translation: Option<PathStatistics>,
-    /// Relative errors of the rotations, degrees; None without `rpe`.
+    /// Relative errors of the rotations in degrees; None without `rpe`.
     rpe_rotation: Option<PathStatistics>,
     /// The number of steps for which relative errors are computed.
     rpe_count: usize,
@@ -401,7 +401,6 @@ fn of_compare(error: CompareError) -> PyErr {
 
 /// Compares two clips, or two arrays: the largest and the mean difference, and where it is.
 ///
-/// `compare(first, second, *, fps=None, at=None, start=None, end=None, world=False, engine=None)`
 /// Clips are interpolated as their files state, at every key of both and halfway between neighbouring keys, or at `fps`
 /// (from `start` to `end`), or at the times `at`. Tracks are matched by equal names, or by index if neither clip has
 /// names. `world` compares joints in the world instead of relative to their parents. Returns a `ClipDifference`, whose
@@ -537,9 +536,6 @@ fn of_clips(
 
 /// The errors of an estimated trajectory against its reference, as in benchmarks of odometry and SLAM. The
 /// numbers are the same as those of the program `evo`.
-///
-/// `path_errors(reference, estimate, *, align="none", rpe=None, associate="interpolated", max_gap=None,
-/// track=None, engine=None)`
 ///
 /// Both clips have one track, or `track` selects one. They are compared at the times of the clip with fewer poses,
 /// where the other is interpolated by lines and arcs; `associate="nearest:0.01"` takes its nearest pose within 0.01 s,

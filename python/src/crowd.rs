@@ -187,9 +187,6 @@ impl Crowd {
 
     /// Sets what instances play from now on.
     ///
-    /// `set(instances, clip, *, layer=0, time=0.0, speed=1.0, wrap="loop", weight=1.0, additive=False,
-    /// mask=None)`
-    ///
     /// `instances`: their indices, (n,), or one. `clip`, `time` (seconds of the clip), `speed` and `weight`
     /// are one for all of them or (n,). `wrap`: "hold", "loop" or "mirror", outside of the clip. `weight`:
     /// how much of the layer is laid over those below, 0 to 1. `additive`: the clip's difference from its
@@ -273,8 +270,6 @@ impl Crowd {
     /// The poses of all instances at the clock's time: (instances, joints, 3, 4), for column vectors, the
     /// last column the translation; or of "rotations" (instances, joints, 4), x y z w.
     ///
-    /// `evaluate(values="model", *, dtype="float32", out=None)`
-    ///
     /// `values`: "model", "skinning" (times the inverse bind matrices), "local" (in the parents' frames), or
     /// "rotations" (in the parents' frames). `dtype`: "float32" or "float16".
     ///
@@ -332,7 +327,7 @@ impl Crowd {
         Ok(array)
     }
 
-    /// The time in its clip that each instance plays in a layer, seconds: (instances,), float64.
+    /// The time in seconds of its clip that each instance plays in a layer: (instances,), float64.
     ///
     /// >>> import tumble
     /// >>> door = tumble.Clip([0.0, 2.0], [[[0, 0, 0, 1], [0, 0, 1, 0]]], parents=[None])

@@ -485,11 +485,11 @@ impl Mapping {
         let (cuda, functions) = (self.cuda, &self.cuda.functions);
         if let Some(address) = self.address.take() {
             if *self.is_known.get_mut() {
-                // The library that imported it may have released it while its work was still queued.
-                // SAFETY: the context of these objects is current.
+                // The library that imported the memory may have released it while work on it was still queued: wait
+                // before the memory is freed. SAFETY: the context of these objects is current.
                 cuda.checked("cuCtxSynchronize", unsafe { (functions.synchronize)() })?;
             }
-            // SAFETY: `import` mapped it once, and nothing uses it any more.
+            // SAFETY: `import` mapped the memory once, and nothing uses it any more.
             cuda.checked("cuMemFree", unsafe { (functions.free)(address) })?;
         }
         if let Some((semaphore, _)) = self.semaphore.take() {

@@ -32,7 +32,7 @@ use crate::output::{array_of, filled_bytes, type_name};
 #[pyclass(frozen, weakref, module = "tumble")]
 pub(crate) struct DeviceArray {
     memory: Arc<ArrayMemory>,
-    /// The offset of the array in the memory, bytes.
+    /// The offset of the array in the memory in bytes.
     start: usize,
     shape: Vec<usize>,
     component: ComponentType,

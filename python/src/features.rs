@@ -143,7 +143,7 @@ pub(crate) fn heading_source(axis: Option<&Bound<'_, PyAny>>) -> PyResult<Headin
 }
 
 /// The motion over the ground of a root at `positions` (frames, 3) with `quaternions` (frames, 4), and the rest: its
-/// places on the ground (frames, 3), its headings (frames,), rad, which count whole turns, and the positions and
+/// places on the ground (frames, 3), its headings (frames,) in rad, which count whole turns, and the positions and
 /// quaternions of the root in place, above the origin and facing heading 0. All are float64. `up` and `axis` are those of
 /// `heading`.
 ///

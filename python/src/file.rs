@@ -194,30 +194,34 @@ impl File {
 /// Reads a motion file of any format (docs/formats.md lists them). An invalid file raises an `InputError` with the
 /// position of the error; oddities are reported as `InputWarning`.
 ///
-/// `load(path, *, format=None, source_fps=None, override_fps=None, source_times=None, map=None, time_unit=None,
-/// source_order=None, duplicates=None, raw_times=False, bridge_gaps=False, keyframes=False, offsets=None,
-/// body_model=None, scale=None, up=None)`
+/// * `format`: the file's format; by default it is recognised by its first bytes and its name.
+/// * `source_fps`: the frame rate of a file that states neither times nor a rate.
+/// * `override_fps`: the frame rate of an NPZ or BVH file without times, instead of the rate that the file states.
+/// * `source_times`: for KITTI, a text file of times, one time in seconds per line.
+/// * `time_unit`: the unit of times that are whole numbers: "s", "ms", "us" or "ns".
+/// * `source_order`: the order of a quaternion's components in TUM and EuRoC files that do not follow their format:
+///   "xyzw" or "wxyz".
+/// * `map`: the contents of arrays or columns, if their names do not say it, such as "rotations=keys:wxyz,time=t". It
+///   has entries NAME=SOURCE, separated by commas. NAME is `rotations`, `translations` or `time` for arrays, and a
+///   known column or a track for tables. SOURCE is an array, a column, a part of a list such as `state[3:7]`, or a
+///   range of columns `rx..rz`; a suffix such as `:wxyz`, `:rotvec` or `:ZXY` gives the representation of rotations.
+///   Known columns are `time`, `track` (or `joint`, `body`), `clip` (`clip_id`, `motion_id`), `x y z w` or `qx qy qz
+///   qw`, `tx ty tz`, `sx sy sz`.
+/// * `duplicates`: which of two different keys at the same time to keep: "first", "last" or "both", which makes a jump.
+/// * `raw_times`: keep times as stored, instead of moving them to exact frame times.
+/// * `bridge_gaps`: skip keys with missing numbers in a table, a trajectory or a log, instead of refusing the file.
+/// * `keyframes`: read only the keys that an FBX file has; by default, keys are added until its curves are followed.
+/// * `offsets`: for files that do not store them, such as those of AMASS: the positions of joints relative to their
+///   parents, (joints, 3), or a dict of x, y, z by the names of joints. Offsets in the file are replaced, with a
+///   warning.
+/// * `body_model`: computes the offsets from a model of SMPL, SMPL-H or SMPL-X as NPZ, or from a folder with one per
+///   gender.
+/// * `scale`: a factor for translations and the length of boxes; "metres" converts from the unit that an FBX file
+///   states.
+/// * `up`: rotate so that "y" or "z" is up, from the up axis that an FBX file states, otherwise from the other of the
+///   two.
 ///
-/// `format`: the file's format; by default it is recognised by its first bytes and its name. `source_fps`: the frame
-/// rate of a file that states neither times nor a rate. `override_fps`: the frame rate of a file of NPZ or BVH without
-/// times, instead of the one that it states. `source_times`: a text file of times, for KITTI, one time in seconds per
-/// line. `time_unit`: the unit of times that are whole numbers, "s", "ms", "us" or "ns". `source_order`: the order of a
-/// quaternion's components in TUM and EuRoC files that do not follow their format, "xyzw" or "wxyz". `map`: what arrays
-/// or columns contain, if their names do not say it, such as "rotations=keys:wxyz,time=t". It has entries NAME=SOURCE,
-/// separated by commas. NAME is `rotations`, `translations` or `time` for arrays, and a known column or a track for
-/// tables. SOURCE is an array, a column, a part of a list such as `state[3:7]`, or a range of columns `rx..rz`; a
-/// suffix such as `:wxyz`, `:rotvec` or `:ZXY` gives the representation of rotations. Known columns are `time`, `track`
-/// (or `joint`, `body`), `clip` (`clip_id`, `motion_id`), `x y z w` or `qx qy qz qw`, `tx ty tz`, `sx sy sz`.
-/// `duplicates`: which of two different keys at the same time to keep: "first", "last" or "both", which makes a jump.
-/// `raw_times`: keep times as stored, instead of moving them to exact frame times. `bridge_gaps`: skip keys with
-/// missing numbers in a table, a trajectory or a log, instead of refusing it. `keyframes`: read only the keys of an FBX
-/// file at its key times, instead of adding keys until its curves are followed. `offsets`: the positions of joints
-/// relative to their parents, (joints, 3), or a dict of x, y, z by the names of joints, for files that do not store
-/// them, such as those of AMASS; offsets in the file are replaced, with a warning. `body_model`: computes the offsets
-/// from a model of SMPL, SMPL-H or SMPL-X as NPZ, or from a folder with one per gender. `scale`: a factor for
-/// translations and the length of boxes; "metres" converts from the unit that an FBX file states. `up`: rotate so that
-/// "y" or "z" is up, from the up axis that an FBX file states, otherwise from the other of the two. `read` is the same
-/// function.
+/// `read` is the same function.
 ///
 /// >>> import tumble
 /// >>> tumble.load("missing.glb")  # doctest: +IGNORE_EXCEPTION_DETAIL

@@ -64,14 +64,18 @@ impl FollowOptions<'_, '_> {
         let speed = match self.speed {
             None => PathSpeed::Keys,
             Some(name) if name.is_instance_of::<PyString>() => {
-                let known = [("keys", PathSpeed::Keys), ("constant", PathSpeed::Constant)];
+                let known = [
+                    ("as-keyed", PathSpeed::Keys),
+                    ("keys", PathSpeed::Keys),
+                    ("constant", PathSpeed::Constant),
+                ];
                 one_of(name, "speed", &known)?
             }
             Some(parts) => match &*doubles(parts, "speed")?.values {
                 &[start, end] => PathSpeed::Eased { start, end },
                 _ => {
                     return Err(input(
-                        "speed: give keys, constant, or the parts of the time in which it grows and falls",
+                        "speed: give as-keyed, constant, or two fractions of the duration, in which the speed grows and falls",
                     ));
                 }
             },

@@ -15,9 +15,6 @@ use crate::run::work;
 
 /// Interpolates keys: `Clip(times, keys, order=order)`, evaluated by a shared engine.
 ///
-/// `evaluate(times, keys, *, fps=None, at=None, order="xyzw", out=None, layout="track",
-/// as_rotation=False, dtype="float32", device_array=False, …)`
-///
 /// `times` and `keys` are as those of `Clip`; `order` is that of the keys and of the result. Keys
 /// (keys, 4) of one track give (frames, 4), (tracks, keys, 4) give (tracks, frames, 4). `fps`, `at`
 /// and the other keywords are as those of `Engine.evaluate`.

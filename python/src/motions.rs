@@ -39,7 +39,7 @@ const TICKS: u32 = 705_600;
 /// The largest factor on the ticks per second, for rates that need finer ticks: times are then rounded to 30 ns.
 const FINEST: f64 = 24.0;
 
-/// The longest clip, ticks.
+/// The longest clip in ticks.
 const LONGEST: f64 = 2.1e9;
 
 /// The number of clips that are reordered together; reordered clips are copies, which take memory.

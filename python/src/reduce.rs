@@ -55,13 +55,13 @@ impl Reduction {
         self.keys[1]
     }
 
-    /// The times of the samples, seconds, (samples,).
+    /// The times of the samples in seconds, (samples,).
     #[getter]
     fn times<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         PyArray1::from_slice(py, &self.times)
     }
 
-    /// The largest angle of all joints at each sample, degrees, (samples,).
+    /// The largest angle of all joints at each sample in degrees: (samples,).
     #[getter]
     fn angles<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         let angles = self.errors.iter().map(|error| error[0].to_degrees());
@@ -93,11 +93,8 @@ impl Reduction {
 
 /// Removes keys from a clip. The curves of the remaining keys are within a tolerance of all samples.
 ///
-/// `reduce(clip, *, tolerance=0.1, distance=None, shell=0.0, curve="linear", together=False, fps=None,
-/// engine=None)`
-///
 /// The samples are the keys of the clip, or its frames at `fps`. At each sample, every joint is within the angle
-/// `tolerance`, degrees, and the distance `distance` (None: the arc of this angle at the end of the longest chain of
+/// `tolerance` in degrees, and the distance `distance` (None: the arc of this angle at the end of the longest chain of
 /// joints). If the clip has a skeleton, this is measured in the world, otherwise for each track. It is checked by
 /// evaluating the remaining keys. `shell`: points at this distance from each joint are within `distance` too. `curve`:
 /// "linear" (arcs and straight lines), "bessel-overhauser", or "cubic", glTF's. `together`: all tracks keep keys at the

@@ -17,16 +17,14 @@ use crate::run::interruptible;
 
 /// Carries a motion over to another skeleton; returns the clip and a report.
 ///
-/// `retarget(clip, target, *, bones=None, rest="auto", rest_frame=None, scale="hips", axes=None)`
-///
 /// `target`: a clip with the skeleton. Joints are paired by the parts of the body that their names mean (VRM, Mixamo,
 /// SMPL, LAFAN1, CMU, Xsens, Unreal, SOMA), or by `bones`, a dict of names of the target's joints to those of the
-/// source's. `rest`: "same" if both skeletons rest in the same pose, "directions" to turn the limbs of the target to the
-/// directions of the source's, "auto" for that where they differ by more than 5 degrees. `rest_frame`: the key of the
-/// source whose pose is its rest pose, such as a T-pose in which takes begin. `scale`: the factor for the
-/// hips' translations: "hips" for the ratio of their heights, "legs" for that of the lengths of the legs, or a number.
-/// `axes`: the rotation x y z w from the axes of the source to those of the target, else it is found from where hips,
-/// head and legs are.
+/// source's. `rest`: "same" if both skeletons rest in the same pose, "directions" to turn the limbs of the target to
+/// the directions of the source's, "auto" for that where they differ by more than 5 degrees. `rest_frame`: the index of
+/// the key of the source whose pose is its rest pose, such as a T-pose in which takes begin. `scale`: the factor for
+/// the hips' translations: "hips" for the ratio of their heights, "legs" for that of the lengths of the legs, or a
+/// number. `axes`: the rotation x y z w from the axes of the source to those of the target, else it is found from where
+/// hips, head and legs are.
 ///
 /// Rotations away from the rest pose are the same in the world. Times are the source's. Joints without a partner keep
 /// their rest rotations, and translations of others than the hips are lost. The report is a dict: `pairs`, `resting`,

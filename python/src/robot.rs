@@ -126,10 +126,6 @@ impl Robot {
 
     /// The bodies of configurations, by forward kinematics in float64.
     ///
-    /// `forward(joint_pos, root_pos=None, root_quat=None, *, order, joint_vel=None, root_lin_vel=None,
-    /// root_ang_vel=None, ball_quat=None, ball_vel=None, body_order="depth-first", siblings="file",
-    /// velocity_at="origin")`
-    ///
     /// `joint_pos`: (…, joints), a value for each of `joint_names`. `root_pos`, `root_quat`: (…, 3) and (…, 4), the pose
     /// of the free joint in the world; of a robot without one, of its base. With several free joints (…, roots, 3).
     /// `ball_quat`: (…, balls, 4). Poses that are left out are the file's. `order`: "wxyz" or "xyzw", of all

@@ -438,8 +438,6 @@ impl Surface {
 
     /// The route between the points of the surface that are nearest to `start` and `goal`.
     ///
-    /// `route(start, goal, *, by=None, avoid=None, clearance=0.0, finest=None, max_slope=None, up=(0, 1, 0))`
-    ///
     /// `by`: of meshes "exact", the shortest one (the default), "plane", "greedy" or "edges"; of nets "line" (the default)
     /// or "facets:N". `avoid`: a mesh of obstacles, from which routes stay `clearance` away; `finest`: the longest edge
     /// along the boundary of the area that obstacles close (default: a hundredth of the mesh's size). `max_slope`: the
@@ -605,7 +603,7 @@ impl Route {
 
 #[pymethods]
 impl Walk {
-    /// When it is at each point, seconds, (n,). Two with the same point are a wait between them.
+    /// When it is at each point in seconds, (n,). Two with the same point are a wait between them.
     #[getter]
     fn times<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         PyArray1::from_slice(py, &self.times)
@@ -638,8 +636,6 @@ impl Walk {
 /// Plans walkers on routes, one after another. Each waits on its route where this is necessary, for moving obstacles
 /// and for the walkers before it. Returns a list with a `Walk` for each, or None for a walker that cannot pass, with
 /// an `InputWarning` that says why.
-///
-/// `walk(routes, *, speed, radius, start=0.0, movers=())`
 ///
 /// `speed` (units of length per second), `radius` (of the ball around a walker) and `start` (seconds) are one number
 /// for all or (n,). `movers`: moving obstacles, each (times, points, radius).

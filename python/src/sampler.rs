@@ -87,8 +87,8 @@ impl Sampler {
         self.clip.motion.set.track_count()
     }
 
-    /// The memory that the clip takes for each key, in bytes. It is 64, or 144 to 208, and more if the clip keeps segments,
-    /// and 16 and more if it keeps its keys instead, as large clips can do.
+    /// The memory that the clip takes for each key, in bytes: if the clip keeps segments, 64 or more for arcs (slerp),
+    /// and 144 to 208 or more for polynomials; if the clip keeps its keys instead, 16 or more.
     ///
     /// >>> import tumble
     /// >>> sampler = tumble.Clip([0.0, 2.0], [[0, 0, 0, 1], [1, 0, 0, 0]]).sampler(method="slerp")
@@ -116,7 +116,7 @@ impl Sampler {
         self.__copy__()
     }
 
-    /// The rotation of a track, by its index or name, at a time, seconds: float32, (4,), a unit quaternion.
+    /// The rotation of a track, by its index or name, at a time in seconds: float32, (4,), a unit quaternion.
     /// `order`: "xyzw" or "wxyz".
     ///
     /// >>> import tumble
@@ -142,7 +142,7 @@ impl Sampler {
         Ok(result)
     }
 
-    /// The rotations at a time, seconds: float32, (tracks, 4), unit quaternions.
+    /// The rotations at a time in seconds: float32, (tracks, 4), unit quaternions.
     ///
     /// `tracks`: a list of indices or names; all if it is left out. `out`: a C-contiguous array of that shape, which is
     /// filled and returned. `order`: "xyzw" or "wxyz".

@@ -42,22 +42,27 @@ const CHUNK: usize = 1 << 20;
 
 /// Writes clips to a file, atomically; the format is that of the file's ending.
 ///
-/// `save(path, clips, *, fps=None, at=None, format=None, sequence=None, linear=(), order=None,
-/// layout="track", end_frame=None, times_out=None, quantize=False, meshopt=False, overwrite=True, engine=None, …)`
+/// `clips`: a `Clip`, the `File` of `load`, or a list of clips. With `fps` or `at`, clips are sampled as by
+/// `Engine.evaluate`, with its options; without, the keys are written at their times.
 ///
-/// `clips`: a `Clip`, the `File` of `load`, or a list of clips. With `fps` or `at` they are sampled as by
-/// `Engine.evaluate`, with its options; without, the keys are written at their times. A clip of a glTF or NPZ file
-/// that is saved in the same format is baked: everything else in the file is kept. An `InputWarning` names what the
-/// clip's file contains and the new file does not, such as meshes and morph weights. NPY, and CSV, Parquet and Arrow
-/// for clips without a skeleton, store only rotations, in the `order` ("xyzw" or "wxyz"; the default of CSV is
-/// "wxyz") and `layout` of these options. The bytes are those that the program `tumble` writes.
-/// `sequence`: the axes of BVH's angles, such as "ZXY". `linear`: names of arrays in an NPZ file, with a number
-/// for each frame, to be interpolated linearly instead of left out. `times_out`: for KITTI, which stores no times, a file
-/// for the times of the poses, one time in seconds per line. `end_frame`: what follows the last frame of `fps` if a clip
-/// ends between two frames: "key", a sample at the end; "hold", one more frame with the value of the end; "leave-out",
-/// nothing. By default formats with times get a key and others a held frame; NPY gets nothing. `quantize`: store glTF rotations with 16 bits a
-/// component, within 6e-5 rad. `meshopt`: compress a new glTF file by `EXT_meshopt_compression`. `engine`: the engine
-/// that evaluates; by default one that all calls share.
+/// A clip of a glTF or NPZ file that is saved in the same format is baked: everything else in the file is kept. An
+/// `InputWarning` names what the clip's file contains and the new file does not, such as meshes and morph weights. NPY,
+/// and CSV, Parquet and Arrow for clips without a skeleton, store only rotations, in the `order` ("xyzw" or "wxyz"; the
+/// default of CSV is "wxyz") and `layout` of these options. The bytes are those that the program `tumble` writes.
+///
+/// * `overwrite`: replace an existing file; `False` raises an `OutputError` instead. (The program replaces files only
+///   with `--overwrite`.)
+/// * `sequence`: the axes of BVH's angles, such as "ZXY".
+/// * `linear`: names of arrays in an NPZ file, with a number for each frame, to be interpolated linearly instead of
+///   left out.
+/// * `times_out`: for KITTI, which stores no times, a file for the times of the poses, one time in seconds per line.
+/// * `end_frame`: the sample after the last frame of `fps` if a clip ends between two frames: "key", a sample at the
+///   end; "hold", one more frame with the value of the end; "leave-out", nothing. By default formats with times get a
+///   key and others a held frame; NPY gets nothing.
+/// * `quantize`: store glTF rotations with 16 bits per component, within 6e-5 rad.
+/// * `meshopt`: compress a new glTF file by `EXT_meshopt_compression`.
+/// * `engine`: the engine that evaluates; by default one that all calls share.
+///
 /// `write` is the same function.
 ///
 /// >>> import numpy as np, tempfile, os, tumble

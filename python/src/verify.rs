@@ -21,13 +21,13 @@ pub(crate) struct Verification {
     rotations: u64,
     /// Rotations whose bits differ between the device and the CPU.
     differing: u64,
-    /// The largest angle between a result and the reference, rad.
+    /// The largest angle between a result and the reference in rad.
     max_error: f64,
-    /// The root mean square of that angle, rad.
+    /// The root mean square of that angle in rad.
     rms_error: f64,
     /// The largest distance of a norm from 1.
     max_norm_error: f64,
-    /// The largest `max_error` that is allowed, rad.
+    /// The largest `max_error` that is allowed in rad.
     error_bound: f64,
     /// Whether a Vulkan device was compared with the CPU, all bits agree and all errors are within
     /// their bounds, those of velocities, matrices and other outputs included.

@@ -169,7 +169,7 @@ def test_the_bytes_are_those_of_one_process(connected, library, monkeypatch):
     assert_equal("one", "ray")
     tumble_program("check", "ray")
     resumed = tumble_program("eval", "clips", "-o", "ray", "--fps", "240", "--resume")
-    assert f"{CLIPS} results skipped" in resumed.stderr
+    assert f"{CLIPS} results kept" in resumed.stderr
     again = evaluate("clips", "ray", fps=240, shard_bytes=SHARD)
     assert (again.made, again.skipped) == (0, CLIPS)
     assert_equal("one", "ray")
@@ -322,7 +322,7 @@ def test_drivers_are_killed(machines, library):
     # Ray may print a line about a lost node before the report.
     report = json.loads(done.stdout[done.stdout.index("{\n") :])
     assert (report["made"] + report["skipped"], report["exit_code"]) == (CLIPS, 0)
-    assert f"{report['made']} made, {report['skipped']} skipped, 0 failed" in done.stderr
+    assert f"{report['made']} made, {report['skipped']} kept, 0 failed" in done.stderr
     assert_equal(library / "one", out)
 
 

@@ -109,6 +109,24 @@ def test_the_reference_is_that_of_the_package():
     assert written == page.read_text(encoding="utf-8"), "UPDATE_EXPECTED=1 writes docs/python-reference.md"
 
 
+def test_the_stubs_have_the_docstrings():
+    """Editors show the texts of the stubs. `UPDATE_EXPECTED=1` writes them."""
+    path = ROOT / "scripts" / "python_stub_docs.py"
+    specification = importlib.util.spec_from_file_location("python_stub_docs", path)
+    script = importlib.util.module_from_spec(specification)
+    specification.loader.exec_module(script)
+    found = script.STUBS.read_text(encoding="utf-8")
+    expected = script.with_docs(found, script.first_paragraph)
+    if "UPDATE_EXPECTED" in os.environ:
+        script.STUBS.write_text(expected, encoding="utf-8")
+        found = expected
+    assert found == expected, "UPDATE_EXPECTED=1 writes the texts of the stubs"
+    assert found.count('"""') > 300
+    # A text that differs is found.
+    changed = script.with_docs(found, lambda name: "Another text." if name == "load" else None)
+    assert changed != found and 'def load(' in changed and '"""Another text."""' in changed
+
+
 ROBOT = """<mujoco><worldbody><body name="pelvis"><freejoint name="root"/>
 <body name="shin"><joint name="knee"/></body></body></worldbody></mujoco>"""
 

@@ -390,6 +390,8 @@ def test_forms_of_paths(rng, engine):
         assert all(np.array_equal(a, b[track]) for a, b in zip(one, both))
     lists = engine.follow([times, times], list(points), fps=10, layout="frame", order="wxyz")
     assert np.array_equal(lists[1].swapaxes(0, 1)[..., [1, 2, 3, 0]], both[1])
+    for speed in ("keys", "as-keyed"):  # the short name, and that of the program
+        assert all(map(np.array_equal, engine.follow(times, points, fps=10, speed=speed), both))
     at = engine.follow(times, points[0], at=2.0)
     assert [array.shape for array in at] == [(3,), (4,)]
     steady, _ = engine.follow(None, points[0], rate=2.0, method="linear", fps=100, speed="constant")

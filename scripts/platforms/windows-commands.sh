@@ -76,7 +76,7 @@ done=$(find results -name '*.npy' | wc -l)
 echo "killed after $done of 40 results"
 [ "$done" -lt 40 ] || { echo "the batch was over before it was killed" >&2 && exit 1; }
 windows eval library -o results --fps 60 --resume >second.log 2>&1 || { cat second.log >&2 && exit 1; }
-grep -i 'skipped' second.log | tr -d '\r' || true
+grep -i 'already complete' second.log | tr -d '\r' || true
 for result in linux-results/*.npy; do same "$result" "results/$(basename "$result")"; done
 [ "$(find results -type f | wc -l)" -eq "$(find linux-results -type f | wc -l)" ] || {
     diff <(cd linux-results && find . -type f | sort) <(cd results && find . -type f | sort)

@@ -14,7 +14,7 @@ use crate::simd::lanes::Lanes;
 use crate::time::runs::Affine;
 use crate::twin::Evaluate;
 
-/// The minimum size of a result for streaming stores, bytes: the caches would contain so little of it that its reader
+/// The minimum size in bytes of a result for streaming stores: the caches would contain so little of it that its reader
 /// does not benefit.
 const LONG: usize = 32 << 20;
 
@@ -36,7 +36,7 @@ pub(crate) struct Stage<'o> {
 
 /// The destination of consecutive rows in an encoding.
 pub(crate) enum RowStage<'o> {
-    /// As four f32 a value.
+    /// As four f32 per value.
     Values(Stage<'o>),
     Encoded(EncodedStage<'o>),
 }

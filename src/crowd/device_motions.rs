@@ -44,8 +44,11 @@ impl DeviceMotions {
     /// Copies tables to the engine's device. The spans and cells are those that belong to the tables.
     ///
     /// # Errors
-    /// When the engine is the CPU, the spans and cells do not belong to the tables, the tables need more memory than the
-    /// device or the engine's memory budget has or more than kernels can bind, or the device fails.
+    /// * When the engine is the CPU.
+    /// * When the spans and cells do not belong to the tables.
+    /// * When the tables need more memory than the device or the engine's memory budget has, or more than kernels can
+    ///   bind.
+    /// * When the device fails.
     pub fn new(
         engine: &Engine,
         tables: &MotionTables,
@@ -75,10 +78,12 @@ impl DeviceMotions {
         self.resident.bytes()
     }
 
-    /// Computes states into memory that the host reads: of a device that shares the host's memory, memory that the
-    /// kernels write. `at` has a clip and a tick for each instance, as for [`MotionTables::sample_into`]; with `steps`,
-    /// velocities are differences, as for [`MotionTables::differences_into`]. Also returned are the ranges of the arrays
-    /// in the memory, bytes: `[instance][joint][number]`, f32.
+    /// Computes states into memory that the host can read. On a device that shares the host's memory, the kernels write
+    /// directly into this memory; from other devices the result is copied.
+    ///
+    /// `at` has a clip and a tick for each instance, as for [`MotionTables::sample_into`]; with `steps`, velocities are
+    /// differences, as for [`MotionTables::differences_into`]. Also returned are the ranges of the arrays in the
+    /// memory, in bytes; each array is `[instance][joint][number]`, f32.
     ///
     /// # Errors
     /// When a clip does not exist, there are more or fewer steps than instances, there is not enough memory, the device
@@ -94,8 +99,9 @@ impl DeviceMotions {
         Ok((states, ranges.into_iter().map(in_memory).collect()))
     }
 
-    /// As [`DeviceMotions::sample`], into memory of the device that other interfaces on the same card, such as CUDA, can
-    /// import. If they can wait for the device, this returns while it is still writing.
+    /// As [`DeviceMotions::sample`], into memory of the device that other interfaces on the same card, such as CUDA,
+    /// can import. If the other interface can wait for the device, this function returns while the device is still
+    /// writing.
     ///
     /// # Errors
     /// As [`DeviceMotions::sample`], and when the device cannot export memory.

@@ -19,7 +19,7 @@ pub struct ClipEvent {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct PassedEvent {
-    /// The time of the clock at which the layer reached the event, ticks.
+    /// The clock's time in ticks at which the layer reached the event.
     pub clock: u64,
     /// The instance.
     pub instance: usize,

@@ -17,9 +17,9 @@ pub struct CrowdFade {
     pub from: f32,
     /// The weight after the fade, 0 to 1, rounded to a multiple of 2^-15.
     pub to: f32,
-    /// The clock's time at which the fade starts, ticks; in the past or in the future.
+    /// The clock's time in ticks at which the fade starts; in the past or in the future.
     pub start: u64,
-    /// The duration of the fade, ticks; with 0 the weight changes at once.
+    /// The duration of the fade in ticks; with 0 the weight changes at once.
     pub ticks: u64,
 }
 

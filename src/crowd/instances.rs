@@ -72,9 +72,9 @@ impl Instances {
         }
     }
 
-    /// Sets the clock. Entries have times relative to their anchors, up to 2^40 ticks later. If the clock goes
-    /// further, all entries get new anchors; if it goes back, the entries whose anchors would be later than the clock
-    /// get new ones.
+    /// Sets the clock. Entries store their anchors modulo 2^40 ticks. Therefore all entries get new anchors when the
+    /// clock is 2^39 ticks after the last time at which they did. If the clock goes back, the entries whose anchors
+    /// would be later than the clock get new ones.
     pub(crate) fn set_clock(&mut self, clock: u64, clips: &[CrowdClip], masks: usize) {
         let is_late = clock.saturating_sub(self.since) >= 1 << (ELAPSED_BITS - 1);
         let back = self.clock.saturating_sub(clock);

@@ -24,7 +24,7 @@ const SPEED_UNITS: f32 = 65536.0;
 pub struct CrowdLayer {
     /// The clip's index in the library.
     pub clip: usize,
-    /// The layer's current time in the clip, ticks. Outside the clip the wrap mode applies.
+    /// The layer's current time in ticks of the clip. Outside the clip the wrap mode applies.
     pub time: i64,
     /// The speed: ticks of the clip for each tick of the clock, between -128 and 128; negative to play backwards.
     pub speed: f32,
@@ -81,7 +81,7 @@ impl CrowdLayer {
         }
     }
 
-    /// The same layer at another time of its clip, ticks.
+    /// The same layer at another time in ticks of its clip.
     #[must_use]
     pub fn at(self, time: i64) -> Self {
         Self { time, ..self }

@@ -163,7 +163,7 @@ impl CrowdLibrary {
         self.masks.len() / self.joint_count() - 1
     }
 
-    /// The length of a clip, ticks: from its first key (of a rotation, translation or scale) to its last, and at
+    /// The length of a clip in ticks: from its first key (of a rotation, translation or scale) to its last, and at
     /// least 1. This is also the period of a loop. `None` if there is no such clip.
     #[must_use]
     pub fn ticks(&self, clip: usize) -> Option<u32> {
@@ -180,9 +180,11 @@ impl CrowdLibrary {
     /// clip, for additive layers, is its pose at its start ([`CrowdLibrary::set_reference`]).
     ///
     /// # Errors
-    /// When the set has not one track for each joint, a track has the name of no joint, a track cannot be interpolated
-    /// as requested, the interpolation computes velocities or accelerations, a curve rotates so fast that no polynomial fits it, the clip has too
-    /// many ticks, the library is full, or there is not enough memory.
+    /// * When the set has not one track for each joint, or a track has the name of no joint.
+    /// * When a track cannot be interpolated as requested, or the interpolation computes velocities or accelerations.
+    /// * When a curve rotates so fast that no polynomial fits it.
+    /// * When the clip has too many ticks, or the library is full.
+    /// * When there is not enough memory.
     pub fn push(
         &mut self,
         set: &TrackSet,
@@ -251,8 +253,8 @@ impl CrowdLibrary {
         Ok(clip)
     }
 
-    /// Sets the reference pose of `clip`, from which its additive layers differ: the pose of the clip `from` at a
-    /// tick. After the end of `from` it is its last pose. A reference scale of 0 counts as 1.
+    /// Sets the reference pose of `clip`, from which its additive layers differ: the pose of the clip `from` at `tick`;
+    /// for ticks after the end of `from`, its last pose. A reference scale of 0 counts as 1.
     ///
     /// # Errors
     /// When one of the two clips does not exist.
@@ -329,11 +331,11 @@ impl CrowdLibrary {
         Ok(mask)
     }
 
-    /// Continues poses of [`CrowdValues::Local`](crate::crowd::CrowdValues::Local) to those of
+    /// Converts poses of [`CrowdValues::Local`](crate::crowd::CrowdValues::Local) to
     /// [`CrowdValues::Model`](crate::crowd::CrowdValues::Model), in place, with the same bits as a crowd that evaluates
-    /// these at once. Between the two stages a program may change the transforms, such as by inverse kinematics. `poses`
-    /// are `[instance][joint]`, three rows of four numbers each, of any number of instances; several threads may take a
-    /// part each.
+    /// [`CrowdValues::Model`](crate::crowd::CrowdValues::Model) directly. Before, a program may change the local
+    /// transforms, for example by inverse kinematics. `poses` are `[instance][joint]`, three rows of four numbers each,
+    /// of any number of instances; several threads may take a part each.
     ///
     /// ```
     /// use tumble::glam::{Quat, Vec3};
@@ -348,8 +350,8 @@ impl CrowdLibrary {
     /// let mut crowd = Engine::new(Device::Cpu)?.crowd(&library, 100, 1)?;
     /// let mut poses = vec![[0.0; 4]; crowd.output_len(CrowdValues::Local)];
     /// crowd.evaluate_into(CrowdValues::Local, &mut poses)?;
-    /// for hip in poses.chunks_exact_mut(3 * library.joint_count()) {
-    ///     hip[1][3] += 0.25; // the second row's last number: y of the first joint
+    /// for pose in poses.chunks_exact_mut(3 * library.joint_count()) {
+    ///     pose[1][3] += 0.25; // the hip is the first joint: its row 1 is y, whose last number is the translation
     /// }
     /// library.local_to_model(&mut poses)?;
     /// assert_eq!(poses[3 + 1][3], -0.5 + 0.25);
@@ -365,8 +367,8 @@ impl CrowdLibrary {
         Ok(())
     }
 
-    /// Continues poses of [`CrowdValues::Model`](crate::crowd::CrowdValues::Model) to those of
-    /// [`CrowdValues::Skinning`](crate::crowd::CrowdValues::Skinning), as [`CrowdLibrary::local_to_model`].
+    /// Converts poses of [`CrowdValues::Model`](crate::crowd::CrowdValues::Model) to
+    /// [`CrowdValues::Skinning`](crate::crowd::CrowdValues::Skinning), in place, as [`CrowdLibrary::local_to_model`].
     ///
     /// # Errors
     /// When `poses` are no whole number of instances, or the library has no inverse bind matrices.
@@ -450,8 +452,8 @@ impl CrowdLibrary {
         }
     }
 
-    /// Converts the library's clips to tables, with their spans and cells. Masks, reference poses and inverse bind
-    /// matrices are not included.
+    /// Converts the library's clips to tables. Returns the tables, then their two large parts: the spans (intervals in
+    /// ticks) and the cells (constants and keys). Masks, reference poses and inverse bind matrices are not included.
     #[must_use]
     pub fn into_tables(self) -> (MotionTables, Vec<[u32; 4]>, Vec<[f32; 4]>) {
         let (ticks_per_second, joints) = (self.ticks_per_second(), self.joint_count());
@@ -559,7 +561,8 @@ impl MotionBuilder {
         Ok(())
     }
 
-    /// The tables of the clips, with their spans and cells.
+    /// Returns the tables of the clips, then their two large parts: the spans (intervals in ticks) and the cells
+    /// (constants and keys).
     #[must_use]
     pub fn finish(self) -> (MotionTables, Vec<[u32; 4]>, Vec<[f32; 4]>) {
         self.0.into_tables()

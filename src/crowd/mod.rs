@@ -1,5 +1,5 @@
-//! Crowds: many instances of one skeleton, each of which plays clips at its time. One call evaluates all of them, on
-//! the CPU or on a Vulkan device, with the same bits.
+//! Crowds: many instances of one skeleton, each of which plays clips at its own time. One call evaluates all of them,
+//! on the CPU or on a Vulkan device, with the same bits.
 //!
 //! Characters of a game change their clips a few times a second and are drawn at every frame. Therefore a layer of an
 //! instance is 16 bytes that change only when another clip is played; its time follows from one clock that counts
@@ -19,8 +19,8 @@
 //! # Steps
 //!
 //! 1. [`Crowd::set`] packs a layer into its entry and marks the entry as changed.
-//! 2. An evaluation computes, for each layer of each instance, its tick, and from the tick its position in each time
-//!    base.
+//! 2. An evaluation computes, for each layer of each instance, its tick, and from the tick its position among the key
+//!    times of the clip (a *time base* is a list of key times that channels share).
 //! 3. It evaluates the rotation, translation and scale of each joint in the lowest layer and blends the other layers
 //!    over it.
 //! 4. For matrices in the model it multiplies along the skeleton, level by level, and for skinning matrices also by

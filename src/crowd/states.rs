@@ -46,12 +46,13 @@ pub struct MotionStates<'a> {
     pub world_rotations: &'a mut [[f32; 4]],
     /// The velocity in the world: the derivative of the position.
     pub velocities: &'a mut [[f32; 3]],
-    /// The angular velocity about the world's axes, radians per second: the derivative of the world rotation.
+    /// The angular velocity about the world's axes in radians per second: the derivative of the world rotation.
     pub angular_velocities: &'a mut [[f32; 3]],
 }
 
-/// The clips of a [`CrowdLibrary`](crate::crowd::library::CrowdLibrary) as plain tables. The two large tables, spans
-/// and cells, are separate, so that several processes can map them from a file.
+/// The clips of a [`CrowdLibrary`](crate::crowd::library::CrowdLibrary) as plain tables. The two large tables are
+/// separate, so that several processes can map them from a file: spans (intervals in ticks) and cells (constants and
+/// keys).
 ///
 /// ```
 /// use tumble::glam::{Quat, Vec3};
@@ -215,8 +216,10 @@ impl MotionTables {
     /// The tables of some clips alone, each once, in this order, with their spans and cells. They give the same states.
     ///
     /// # Errors
-    /// When a clip does not exist or is listed twice, the spans and cells do not belong to the tables, the tables are not those that a
-    /// [`MotionBuilder`](crate::crowd::MotionBuilder) makes, or there is not enough memory.
+    /// * When a clip does not exist or is listed twice.
+    /// * When the spans and cells do not belong to the tables, or no [`MotionBuilder`](crate::crowd::MotionBuilder)
+    ///   made the tables.
+    /// * When there is not enough memory.
     pub fn select(
         &self,
         (spans, cells): (&[[u32; 4]], &[[f32; 4]]),
@@ -255,7 +258,7 @@ impl MotionTables {
         }
         let span_count: usize = ranges.iter().map(|(_, spans, _)| spans.len()).sum();
         let cell_count: usize = ranges.iter().map(|(_, _, cells)| cells.len()).sum();
-        // Clips of a file that share their cells would take more memory than the file.
+        // Refuses clips that share cells: selecting them would need more memory than the file has bytes.
         if span_count > spans.len() || cell_count > cells.len() {
             return Err(CrowdError::BrokenTables);
         }
@@ -343,7 +346,7 @@ impl MotionTables {
         self.ticks_per_second
     }
 
-    /// The length of a clip, ticks, at least 1; `None` if there is no such clip.
+    /// The length of a clip in ticks, at least 1; `None` if there is no such clip.
     #[must_use]
     pub fn ticks(&self, clip: usize) -> Option<u32> {
         self.clips.get(clip).map(|clip| clip.period)
@@ -367,8 +370,10 @@ impl MotionTables {
     /// `vulkan`, a `DeviceMotions` has the tables on a device, which computes there.
     ///
     /// # Errors
-    /// When a clip does not exist, an array is neither empty nor as long as the instances times the joints, the spans
-    /// and cells do not belong to the tables, the system refuses threads, or the work is stopped.
+    /// * When a clip does not exist.
+    /// * When an array is neither empty nor as long as the instances times the joints.
+    /// * When the spans and cells do not belong to the tables.
+    /// * When the system refuses threads, or the work is stopped.
     pub fn sample_into(
         &self,
         engine: &Engine,
@@ -699,7 +704,8 @@ impl Poses<'_> {
                 parameter: 0.0,
             }));
         }
-        // The previous pose of a clip is often a frame away: of a window, or an end of a step.
+        // The previous pose was often of the same clip, about a frame earlier or later (in a window, or at the other
+        // end of a step), so the search starts at its positions.
         for (base, position) in bases.iter().zip(&mut *positions) {
             let guess = position.span & TICKS;
             *position = guessed_position(base, spans, (tick, clip_entry.period), guess);

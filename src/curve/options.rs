@@ -14,8 +14,8 @@ use crate::tracks::signs::Signs;
 
 /// The quantity that is evaluated: the rotation, its velocity or its acceleration.
 ///
-/// Velocities and accelerations are vectors, `x y z 0`, from the derivatives of the formula. At a key they are those
-/// of the segment after it, and at the last key those of the last segment. Where the value at an end is held, they
+/// Velocities and accelerations are vectors, `x y z 0`, from the derivatives of the formula. At a key they are those of
+/// the interval after the key, and at the last key those of the last interval. Where the value at an end is held, they
 /// are 0.
 ///
 /// ```
@@ -35,9 +35,9 @@ pub enum Quantity {
     /// The rotation, a unit quaternion.
     #[default]
     Rotation,
-    /// The angular velocity, radians per second.
+    /// The angular velocity in radians per second.
     Velocity(Axes),
-    /// The angular acceleration, radians per second squared.
+    /// The angular acceleration in radians per second squared.
     Acceleration(Axes),
 }
 
@@ -161,7 +161,7 @@ impl KeySigns {
     }
 }
 
-/// The curve in the first and in the last segment, where a neighbouring key is missing. A track of only two keys is
+/// The curve in the first and in the last interval, where a neighbouring key is missing. A track of only two keys is
 /// interpolated by slerp for any ends.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[doc(alias = "boundary condition")]
@@ -185,7 +185,7 @@ pub enum Ends {
     Secant,
     /// The curve is closed: the last key equals the first, and the curve is smooth there.
     Loop,
-    /// The first and the last segment are constant, with the value of their first key.
+    /// The first and the last interval are constant, with the value of the first key of each.
     Frozen,
 }
 
@@ -199,10 +199,10 @@ names! {
     Frozen => "frozen",
 }
 
-/// The maximum half-angle between the last key of a loop and the first, radians.
+/// The maximum half-angle in radians between the last key of a loop and the first.
 const LOOP_TOLERANCE: f64 = 1e-3;
 
-/// The largest angular velocity at an end, radians per second.
+/// The largest angular velocity at an end in radians per second.
 const FASTEST: f64 = 1e12;
 
 impl Ends {
@@ -288,7 +288,7 @@ pub enum InterpolationError {
     OpenLoop {
         /// The track's index in the set.
         track: usize,
-        /// The angle between the first key and the last, degrees; `Ends::Loop` needs equal keys.
+        /// The angle between the first key and the last in degrees; `Ends::Loop` needs equal keys.
         degrees: f64,
     },
 }

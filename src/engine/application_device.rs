@@ -15,8 +15,10 @@ impl Engine {
     /// Makes an engine on an application's Vulkan device.
     ///
     /// # Errors
-    /// As [`Engine::with_options`]; also when a handle is null, [`VulkanHandles::api_version`] is below 1.1, the
-    /// physical device is not the instance's, or a queue's family cannot do its work.
+    /// * As [`Engine::with_options`].
+    /// * When a handle is null, or [`VulkanHandles::api_version`] is below 1.1.
+    /// * When the physical device does not belong to the instance.
+    /// * When the family of `queue` cannot compute, or that of the copy queue cannot copy.
     ///
     /// # Safety
     /// The handles must be valid and belong together, and must outlive the engine and all of its clips and results.

@@ -87,10 +87,12 @@ impl Engine {
     /// ```
     ///
     /// # Errors
-    /// When the device cannot be opened, the options are out of range, or the device fails the self-test and
-    /// [`EngineOptions::allow_inexact`] is off. Each kernel is checked later, when an evaluation first needs it; if
-    /// it differs from the CPU, that evaluation fails with
-    /// [`VulkanError::InexactKernel`](crate::vulkan::VulkanError::InexactKernel).
+    /// * When the device cannot be opened.
+    /// * When the options are out of range.
+    /// * When the device fails the self-test, and [`EngineOptions::allow_inexact`] is off.
+    ///
+    /// Each kernel is checked later, when an evaluation first needs it; if it differs from the CPU, that evaluation
+    /// fails with [`VulkanError::InexactKernel`](crate::vulkan::VulkanError::InexactKernel).
     pub fn with_options(device: Device, options: &EngineOptions) -> Result<Self, Error> {
         VectorWidth::limit().map_err(Error::VectorWidth)?;
         match device {
@@ -170,9 +172,9 @@ impl Engine {
     /// Compares every kernel on the device with its twin on the CPU, bit by bit, for small, ordinary and extreme
     /// inputs.
     ///
-    /// Evaluations check each kernel when they first need it, unless it is known from this process or an earlier one
-    /// to be exact on this device; this function checks all kernels. A kernel that differs is reported and is not an
-    /// error. Empty on the CPU.
+    /// Evaluations check only the kernels that they need, each before its first use, unless a check in this process or
+    /// an earlier one has found the kernel exact on this device. This function checks all kernels. A kernel that
+    /// differs is listed in the result; this is not an error. The result is empty on the CPU.
     ///
     /// # Errors
     /// When the device fails.
@@ -242,14 +244,17 @@ impl Engine {
 
     /// Prepares a set for an interpolation, or for [one of each track](PerTrack), and stores it on the device as a clip.
     ///
-    /// On the CPU, large clips whose samples can be computed from their keys keep these instead of segments, in much less
-    /// memory ([`Clip::bytes_per_key`]). If the prepared tracks of an interpolation would take more than
-    /// [`EngineOptions::memory`] in either form, the clip stores the keys, and each evaluation prepares them piece by
-    /// piece: slower, with the same bits.
+    /// On the CPU, a clip whose segments would exceed [`EngineOptions::kept_segments`] or [`EngineOptions::memory`]
+    /// keeps its keys instead, if samples can be computed from them ([`Clip::bytes_per_key`]). If the prepared tracks
+    /// of an interpolation would take more than [`EngineOptions::memory`] in either form, the clip keeps the set, and
+    /// each evaluation prepares it piece by piece, which is slower and gives the same bits.
     ///
     /// # Errors
-    /// When a track cannot be interpolated as requested, there are interpolations for another number of tracks or with
-    /// several quantities, there is not enough memory, or the device fails. [`Engine::evaluate`] evaluates sets that are larger than memory, piece by piece.
+    /// * When a track cannot be interpolated as requested.
+    /// * When the interpolations are for another number of tracks, or have several quantities.
+    /// * When there is not enough memory. [`Engine::evaluate`] evaluates sets that are larger than memory, piece by
+    ///   piece.
+    /// * When the device fails.
     pub fn upload(
         &self,
         set: &TrackSet,
@@ -265,10 +270,10 @@ impl Engine {
         Ok(Clip::new(self.clone(), uploaded, keys))
     }
 
-    /// Starts a request for the samples of a set at the times of `frames`, by an interpolation, or by [one of each
+    /// Starts a request for the samples of a set at these times, by an interpolation, or by [one of each
     /// track](PerTrack). The set need not be uploaded.
     ///
-    /// By default the result has all tracks, track by track, with four f32 a value. Only the segments that the
+    /// By default the result has all tracks, track by track, with four f32 per value. Only the segments that the
     /// samples need are prepared. On a Vulkan device a set larger than its memory (or than [`EngineOptions::memory`])
     /// is evaluated some tracks at a time.
     ///
@@ -289,13 +294,13 @@ impl Engine {
         &'a self,
         set: &'a TrackSet,
         interpolations: impl Into<PerTrack<Interpolation>>,
-        frames: &'a SampleTimes,
+        times: &'a SampleTimes,
     ) -> Request<'a> {
-        Request::of_set(self, set, interpolations.into(), frames)
+        Request::of_set(self, set, interpolations.into(), times)
     }
 
     /// Prepares and evaluates a set, `[track][frame]`. Short for [`request`](Engine::request)`(set, interpolations,
-    /// frames).`[`evaluate`](Request::evaluate)`()`.
+    /// times).`[`evaluate`](Request::evaluate)`()`.
     ///
     /// # Errors
     /// As [`Engine::upload`] and [`Clip::evaluate`]; also when the quantity is a velocity or an acceleration.
@@ -303,14 +308,14 @@ impl Engine {
         &self,
         set: &TrackSet,
         interpolations: impl Into<PerTrack<Interpolation>>,
-        frames: &SampleTimes,
+        times: &SampleTimes,
     ) -> Result<Rotations, Error> {
-        self.request(set, interpolations, frames).evaluate()
+        self.request(set, interpolations, times).evaluate()
     }
 
     /// Evaluates the angular velocity or acceleration ([`Interpolation::quantity`]) of every track at every sample.
     /// Short for [`request`](Engine::request)`(set, interpolation,
-    /// frames).`[`layout`](Request::layout)`(layout).`[`rates`](Request::rates)`()`.
+    /// times).`[`layout`](Request::layout)`(layout).`[`rates`](Request::rates)`()`.
     ///
     /// # Errors
     /// As [`Engine::evaluate`], but the quantity must not be the rotation.
@@ -320,10 +325,10 @@ impl Engine {
         &self,
         set: &TrackSet,
         interpolation: Interpolation,
-        frames: &SampleTimes,
+        times: &SampleTimes,
         layout: Layout,
     ) -> Result<Vectors, Error> {
-        self.request(set, interpolation, frames)
+        self.request(set, interpolation, times)
             .layout(layout)
             .rates()
     }
@@ -354,7 +359,7 @@ impl Engine {
     /// Evaluates into memory of the result's type: [`Quat`](glam::Quat) for rotations, [`Vec4`](glam::Vec4) for
     /// velocities and accelerations, or `[f32; 4]` for both. Short for [`request`](Engine::request)`(set,
     /// interpolations,
-    /// frames).`[`layout`](Request::layout)`(layout).`[`evaluate_into`](Request::evaluate_into)`(output)`, which
+    /// times).`[`layout`](Request::layout)`(layout).`[`evaluate_into`](Request::evaluate_into)`(output)`, which
     /// accepts memory of any type.
     ///
     /// Reuse the memory: the first access to fresh memory takes longer than the evaluation
@@ -368,11 +373,11 @@ impl Engine {
         &self,
         set: &TrackSet,
         interpolations: impl Into<PerTrack<Interpolation>>,
-        frames: &SampleTimes,
+        times: &SampleTimes,
         layout: Layout,
         output: &mut [R],
     ) -> Result<(), Error> {
-        self.request(set, interpolations, frames)
+        self.request(set, interpolations, times)
             .layout(layout)
             .evaluate_values_into(output)
     }
@@ -404,19 +409,19 @@ impl Engine {
 
     /// Describes in words how a whole set would be evaluated in f32: whether it is prepared, and in which pieces. All
     /// routes give the same bits. Short for [`request`](Engine::request)`(set, interpolations,
-    /// frames).`[`layout`](Request::layout)`(layout).`[`explain`](Request::explain)`()`, which also knows encodings and
+    /// times).`[`layout`](Request::layout)`(layout).`[`explain`](Request::explain)`()`, which also knows encodings and
     /// parts of a set.
     ///
     /// # Errors
-    /// When the frames do not fit the set.
+    /// As [`Request::size`].
     pub fn explain_route(
         &self,
         set: &TrackSet,
         interpolations: impl Into<PerTrack<Interpolation>>,
-        frames: &SampleTimes,
+        times: &SampleTimes,
         layout: Layout,
     ) -> Result<String, Error> {
-        self.request(set, interpolations, frames)
+        self.request(set, interpolations, times)
             .layout(layout)
             .explain()
     }

@@ -37,7 +37,7 @@ pub(crate) struct TrackStretch {
     pub(crate) intervals: Range<usize>,
     /// The number of intervals of the whole track.
     pub(crate) track_intervals: usize,
-    /// The start and the end of the whole track, seconds.
+    /// The start and the end of the whole track in seconds.
     pub(crate) span: (f64, f64),
     /// Its index among the prepared parts.
     pub(crate) part: usize,

@@ -1,5 +1,5 @@
-//! Clips that keep keys instead of segments: 16 bytes a key, and segments for the few intervals that the series of small
-//! angles does not hold. A segment takes 176 bytes, and samples at one time read one for each track.
+//! Clips that keep keys instead of segments: 16 bytes per key, and segments for the few intervals that the series of
+//! small angles does not hold. A segment takes 176 bytes, and samples at one time read one for each track.
 
 use bytemuck::Zeroable;
 
@@ -50,7 +50,7 @@ pub(crate) struct TimeBetweenKeys {
     pub(crate) key: usize,
     /// The weights of the keys at its start and its end, by [`KeptKeys::weights_at`].
     pub(crate) weights: [TangentWeights; 2],
-    /// Its end and the time, seconds.
+    /// Its end and the time in seconds.
     pub(crate) end: f64,
     pub(crate) time: f64,
     pub(crate) parameter: f32,

@@ -157,9 +157,9 @@ pub struct ClipTarget {
     result: Resource,
     encoding: Encoding,
     buffer: VulkanBuffer,
-    /// The offset at which the buffer is bound, bytes.
+    /// The offset in bytes at which the buffer is bound.
     bound: u64,
-    /// The length of the result, bytes.
+    /// The length of the result in bytes.
     bytes: u64,
     // The descriptor sets refer to this buffer. The caller guarantees that no work that uses it is in flight when the
     // target is dropped.
@@ -215,7 +215,7 @@ impl ClipTarget {
         self.lists.record(recording, self.result, stored);
     }
 
-    /// The length of the result, bytes.
+    /// The length of the result in bytes.
     #[must_use]
     pub fn bytes(&self) -> u64 {
         self.bytes

@@ -23,7 +23,7 @@ use crate::work::crowd::{self, CrowdDevice, CrowdResources, CrowdShape, FrameKer
 /// The minimum number of instances of a window: with it, windows start at multiples of 256 bytes.
 const LEAST_WINDOW: u64 = 32;
 
-/// The size of a window's matrices on a software device, bytes.
+/// The size in bytes of a window's matrices on a software device.
 const SOFTWARE_WINDOW: u64 = 8 << 20;
 
 /// Bytes of a matrix.

@@ -130,13 +130,13 @@ impl ExportedResult {
         Self { exported, bytes }
     }
 
-    /// The length of the result, bytes, from the start of the memory.
+    /// The length of the result in bytes, from the start of the memory.
     #[must_use]
     pub fn bytes(&self) -> u64 {
         self.bytes
     }
 
-    /// The length of the memory, bytes. It is a dedicated allocation of one buffer, which importers must specify.
+    /// The length of the memory in bytes. It is a dedicated allocation of one buffer, which importers must specify.
     #[must_use]
     pub fn memory_bytes(&self) -> u64 {
         self.exported.buffer.memory().1
@@ -243,14 +243,14 @@ impl std::fmt::Debug for ExportedResult {
 /// The minimum number of bytes to import; fewer are copied faster.
 const LEAST: usize = 1 << 20;
 
-/// The size of whole pages, in which memory is imported, bytes.
+/// The size in bytes of whole pages, in which memory is imported.
 const PAGE: usize = 4096;
 
 /// Imported memory of the caller, which a device may read or write as long as this lives.
 pub(crate) struct ImportedMemory<'a> {
     /// The pages that contain it.
     pub(crate) buffer: Buffer,
-    /// Its start in the pages, bytes.
+    /// Its start in the pages in bytes.
     pub(crate) start: usize,
     memory: NonNull<u8>,
     size: usize,
@@ -290,8 +290,8 @@ impl<'a> ImportedMemory<'a> {
             return None;
         }
         let first = NonNull::new(memory.as_ptr().wrapping_sub(start))?;
-        // SAFETY: pages that hold a byte of the process's memory are its own as a whole, and
-        // this keeps the memory borrowed until nothing works on it any more.
+        // SAFETY: a page that has a byte of this process's memory belongs wholly to the process, and the returned value
+        // borrows the memory until the device has finished with it.
         let buffer = unsafe { Buffer::around(device, first, pages as u64) }?;
         Some(Self {
             buffer,

@@ -43,9 +43,9 @@ pub struct VulkanHandles {
     pub copy_queue: Option<VulkanQueue>,
     /// A lock for `queue`, so that the application and the engine may submit at any time, from any thread.
     ///
-    /// The application must lock it whenever it uses `queue`; the engine locks it for each of its submissions. The
-    /// application must not call the engine while it has the lock, because the engine would wait for it forever.
-    /// Without a lock, the application must not use the queue during a call that submits. These calls submit:
+    /// The application must hold the lock whenever it uses `queue`; the engine holds the lock during each submission.
+    /// The application must not call the engine while it holds the lock, because the engine would wait forever. Without
+    /// a lock, the application must not use the queue during a call of the engine that submits. These calls submit:
     /// [`Engine::from_vulkan`](crate::engine::Engine::from_vulkan) and [`Engine::warm`](crate::engine::Engine::warm),
     /// uploads, all evaluations and streams, the functions called `to_buffer` and `target`,
     /// [`Engine::crowd`](crate::engine::Engine::crowd), and a crowd's `submit`. Functions called `record` and those
@@ -237,9 +237,9 @@ impl VulkanQueue {
 pub struct VulkanBuffer {
     /// The buffer.
     pub buffer: vk::Buffer,
-    /// The start of the range, bytes: a multiple of the size of a stored value.
+    /// The start of the range in bytes: a multiple of the size of a stored value.
     pub offset: u64,
-    /// The length of the range, bytes: at least the size of the result.
+    /// The length of the range in bytes: at least the size of the result.
     pub size: u64,
 }
 
@@ -254,7 +254,7 @@ impl VulkanBuffer {
         }
     }
 
-    /// A range of the same size that starts at another offset, bytes.
+    /// A range of the same size that starts at another offset in bytes.
     #[must_use]
     pub fn at(self, offset: u64) -> Self {
         Self { offset, ..self }

@@ -108,7 +108,7 @@ impl<'a> Target<'a> {
             .map_or_else(Self::Slice, Self::ImportedMemory)
     }
 
-    /// The buffer that kernels write, and the start of the result in it, bytes; `None` if each piece of work has a
+    /// The buffer that kernels write, and the offset in bytes of the result in it; `None` if each piece of work has a
     /// buffer.
     pub(crate) fn destination(&self) -> Option<(vk::Buffer, u64)> {
         match self {

@@ -248,7 +248,7 @@ impl KeptLists {
         recording.publish();
     }
 
-    /// The size in device memory, bytes.
+    /// The size in device memory in bytes.
     fn bytes(&self) -> u64 {
         let windows = self.windows.iter();
         let uploads = windows.flat_map(|kept| kept.lists.uploads(kept.work.list));
@@ -256,7 +256,7 @@ impl KeptLists {
     }
 }
 
-/// The maximum size of kept lists, bytes.
+/// The maximum size of kept lists in bytes.
 const MAX_BYTES: u64 = 256 << 20;
 
 /// The number of results whose lists a clip keeps.

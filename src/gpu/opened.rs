@@ -183,7 +183,8 @@ impl Opened {
         engine.window.store(lost.window(), Ordering::Relaxed);
         trust(&engine, &self.options)?;
         let mut current = lock(&self.current);
-        // The engine's threads do not wait for each other.
+        // Worker threads do not wait for `reopening` (`Exclusive::take`), so another thread may have opened the device
+        // meanwhile; then its engine stays.
         if Arc::ptr_eq(&current, lost) {
             *current = Arc::new(engine);
         }

@@ -263,7 +263,7 @@ impl PassTarget {
         })
     }
 
-    /// The length of the result, bytes.
+    /// The length of the result in bytes.
     #[must_use]
     pub fn bytes(&self) -> u64 {
         self.bytes

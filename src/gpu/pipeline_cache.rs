@@ -10,7 +10,7 @@ use crate::machine::cache::{Cache, sum};
 use crate::machine::options::CacheFiles;
 use crate::threads::lock;
 
-/// The maximum size of a cache, bytes: all kernels of a card take a few MB.
+/// The maximum size of a cache in bytes: all kernels of a card take a few MB.
 const MAX_BYTES: usize = 64 << 20;
 
 /// A pipeline cache of Vulkan; null if it could not be made, which only costs time.

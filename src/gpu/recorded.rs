@@ -185,9 +185,9 @@ pub enum CommandUsers {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[non_exhaustive]
 pub struct CommandScopes {
-    /// The users before it of its inputs and of the memory of its result.
+    /// The earlier commands that use the inputs of the target or the memory of its result: the target waits for them.
     pub before: CommandUsers,
-    /// The users after it of its result.
+    /// The later commands that use the result: they wait for the target.
     pub after: CommandUsers,
 }
 

@@ -10,9 +10,9 @@ use crate::machine::error::VulkanError;
 use crate::machine::error::calls::Named;
 use crate::threads::lock;
 
-/// The maximum size of a buffer in a shared allocation, bytes; larger buffers have separate allocations.
+/// The maximum size of a buffer in a shared allocation in bytes; larger buffers have separate allocations.
 const LARGEST: u64 = 512 << 10;
-/// The size of a shared allocation, bytes.
+/// The size of a shared allocation in bytes.
 const BLOCK: u64 = 4 << 20;
 
 /// The shared allocations (blocks) of a device.
@@ -140,7 +140,7 @@ fn allocate(device: &ash::Device, kind: MemoryKind, size: u64) -> Result<Share, 
     };
     if kind.mapped {
         let flags = vk::MemoryMapFlags::empty();
-        // SAFETY: the memory is visible to the host and not mapped yet; freeing it unmaps it.
+        // SAFETY: the memory is visible to the host and not mapped yet; it is unmapped when it is freed.
         let mapped = unsafe { device.map_memory(memory, 0, vk::WHOLE_SIZE, flags) };
         let mapped = mapped.named("vkMapMemory").inspect_err(|_| {
             // SAFETY: nothing uses it.

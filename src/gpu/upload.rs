@@ -16,7 +16,7 @@ pub(crate) struct Upload {
     written: Option<Buffer>,
     /// The copy in device memory, if there is one.
     copied: Option<Buffer>,
-    /// The size of the last upload, bytes.
+    /// The size of the last upload in bytes.
     used: usize,
 }
 
@@ -82,7 +82,7 @@ impl Upload {
         }
     }
 
-    /// The size of the memory that kernels read, bytes.
+    /// The size in bytes of the memory that kernels read.
     pub(crate) fn bytes(&self) -> u64 {
         let read = self.copied.as_ref().or(self.written.as_ref());
         read.map_or(0, |buffer| buffer.size)

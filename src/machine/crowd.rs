@@ -30,7 +30,7 @@ pub(crate) struct CrowdSource<'a> {
 
 /// The changes that a device needs for an evaluation.
 pub(crate) struct CrowdFrame<'a> {
-    /// The clock, ticks.
+    /// The clock in ticks.
     pub(crate) clock: u64,
     pub(crate) changes: EntryChanges<'a>,
     /// Number of instances that are evaluated.

@@ -44,7 +44,7 @@ pub enum VulkanError {
         "the Vulkan drivers did not answer within {seconds} s; cards without NVIDIA's persistence daemon (nvidia-persistenced) and machines with many cards take long to start: run the daemon, wait longer (TUMBLE_DRIVER_SECONDS={}), or name the drivers to load in VK_DRIVER_FILES", seconds.saturating_mul(3)
     )]
     SlowDriver {
-        /// The time limit, seconds.
+        /// The time limit in seconds.
         seconds: u64,
     },
     /// A kernel binds more storage buffers than the device allows.
@@ -96,11 +96,11 @@ pub enum VulkanError {
         "the range of {size} bytes at {offset} ends beyond the buffer, which has {memory} bytes of memory"
     )]
     BufferEnd {
-        /// The start of the range, bytes.
+        /// The start of the range in bytes.
         offset: u64,
-        /// The length of the range, bytes.
+        /// The length of the range in bytes.
         size: u64,
-        /// The length of the buffer's memory, bytes: the buffer's length, rounded up.
+        /// The length of the buffer's memory in bytes: the buffer's length, rounded up.
         memory: u64,
     },
     /// The application's queue lock did not call the function that was passed to it.
@@ -144,7 +144,7 @@ pub enum VulkanError {
     /// The device did not finish in time.
     #[error("the device did not finish a dispatch within {seconds} s")]
     Timeout {
-        /// The time limit, seconds.
+        /// The time limit in seconds.
         seconds: u64,
     },
     /// The self-test found other bits than the CPU's.
@@ -180,13 +180,13 @@ pub enum VulkanError {
         "the buffer's range of {size} bytes at {offset} does not fit: the result has {needed} bytes, and starts at a multiple of {rotation}"
     )]
     BufferRange {
-        /// The start of the range, bytes.
+        /// The start of the range in bytes.
         offset: u64,
-        /// The length of the range, bytes.
+        /// The length of the range in bytes.
         size: u64,
-        /// The size of a value of the result, bytes; the range must start at a multiple of it.
+        /// The size of a value of the result in bytes; the range must start at a multiple of it.
         rotation: u64,
-        /// The length of the result, bytes.
+        /// The length of the result in bytes.
         needed: u64,
     },
     /// The device cannot export the memory of results.
@@ -208,9 +208,9 @@ pub enum VulkanError {
     OverBudget {
         /// The contents.
         subject: &'static str,
-        /// The required size, bytes.
+        /// The required size in bytes.
         bytes: u64,
-        /// The budget, bytes.
+        /// The budget in bytes.
         budget: u64,
     },
     /// A buffer would exceed the device's limits.
@@ -220,9 +220,9 @@ pub enum VulkanError {
     TooLarge {
         /// The buffer's contents.
         subject: &'static str,
-        /// The required size, bytes.
+        /// The required size in bytes.
         bytes: u64,
-        /// The device's limit, bytes.
+        /// The device's limit in bytes.
         limit: u64,
     },
 }

@@ -118,7 +118,7 @@ pub enum CacheFiles {
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 #[non_exhaustive]
 pub struct EngineOptions {
-    /// The limit of memory, bytes: on a Vulkan device for everything except results, on the CPU for the segments of a
+    /// The limit of memory in bytes: on a Vulkan device for everything except results, on the CPU for the segments of a
     /// set. By default there is none. Larger sets are prepared piece by piece.
     pub memory: Option<u64>,
     /// The limit, in bytes, for the segments of a clip on the CPU. A clip with larger segments keeps its keys instead, if

@@ -1,6 +1,6 @@
 //! The choice of a route, once for each request. A [`Plan`] says how a request is evaluated; it is made from the
-//! request and the [`Limits`] of a machine, and knows no device. Every door of the engine makes a plan and carries it
-//! out, and `explain` prints it.
+//! request and the [`Limits`] of a machine, and knows no device. Every public function of the engine that evaluates
+//! makes a plan and carries it out; `explain` prints the plan.
 //!
 //! Every route gives the same bits; routes differ in the segments that they prepare and keep. If a set has fewer
 //! samples than keys, most prepared segments would never be used, and a set larger than memory cannot be prepared as
@@ -78,7 +78,7 @@ pub(crate) enum Route {
     /// In pieces: all segments of a piece are prepared, and uploaded to a device, before its first sample is
     /// evaluated.
     Pieces {
-        /// The maximum size of the segments of a piece, bytes.
+        /// The maximum size of the segments of a piece in bytes.
         limit: usize,
     },
 }
@@ -159,10 +159,10 @@ const KEYS_OF_A_SAMPLE: usize = 8;
 /// The same number for methods that solve equations for the velocities at the keys of a whole window of the track.
 const KEYS_OF_A_SOLUTION: usize = 2048;
 
-/// The maximum size of the segments of a piece, if the engine's options have no limit, bytes.
+/// The maximum size in bytes of the segments of a piece, if the engine's options have no limit.
 const SEGMENT_BYTES: usize = 256 << 20;
 
-/// The size of segments that a device gets at once if a request has far more keys than samples, bytes. Each piece
+/// The size in bytes of segments that a device gets at once if a request has far more keys than samples. Each piece
 /// uses the buffers of the previous one: fresh memory for all segments would take longer than preparing them.
 const DENSE_BYTES: usize = 64 << 20;
 
@@ -371,7 +371,7 @@ pub(crate) fn bytes_of(request: &SetRequest<'_>) -> usize {
     keys.saturating_mul(key_bytes(request.interpolation))
 }
 
-/// The maximum size of the segments of a piece, bytes.
+/// The maximum size of the segments of a piece in bytes.
 fn piece_limit(request: &SetRequest<'_>, limits: &Limits) -> usize {
     match limits.kind {
         MachineKind::Cpu { .. } => limits.memory.unwrap_or(SEGMENT_BYTES),

@@ -21,15 +21,15 @@ pub struct DeviceInfo {
     pub uuid: String,
     /// The maximum number of bytes of one buffer that a kernel can access.
     pub max_storage_buffer_range: u64,
-    /// The maximum size of an allocation, bytes.
+    /// The maximum size of an allocation in bytes.
     pub max_memory_allocation_size: u64,
     /// The maximum number of invocations in one workgroup.
     pub max_compute_work_group_invocations: u32,
     /// The maximum number of workgroups of one dispatch, along each axis.
     pub max_compute_work_group_count: [u32; 3],
-    /// The alignment of offsets into storage buffers, bytes.
+    /// The alignment of offsets into storage buffers in bytes.
     pub min_storage_buffer_offset_alignment: u64,
-    /// The size of device-local memory, bytes.
+    /// The size of device-local memory in bytes.
     pub device_local_memory: u64,
     /// Whether signed zeros, infinities and NaN can be preserved (f32).
     pub preserves_signed_zero_inf_nan: bool,
@@ -68,7 +68,7 @@ pub struct SelfTestReport {
 }
 
 /// The results of the self-test's expressions without the decorations that forbid the driver to change them. If no
-/// result differs, it is not shown that the comparison can detect differences on this device.
+/// result differs, the comparison has not been shown to detect differences on this device.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
@@ -108,6 +108,6 @@ pub struct KernelCheck {
     pub differing: usize,
     /// Whether nothing was compared now, because the kernel is known to have passed on this device.
     pub remembered: bool,
-    /// Whether it differs, and the engine evaluates with other kernels in its place, which have the CPU's bits.
+    /// Whether the kernel differs and the engine uses other kernels instead, which have the CPU's bits.
     pub replaced: bool,
 }

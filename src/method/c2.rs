@@ -108,7 +108,7 @@ fn velocities(
         let (first_solved, solved) = solve(track, signs, from..to, interpolation);
         keys.map(move |key| solved[(key as isize - first_solved) as usize].to_array())
     };
-    // If the work was stopped, the caller finds this out itself.
+    // If the work was stopped, the caller notices it after this function has returned.
     let windows = windows.take_while(|_| !stop::is_stopped());
     windows.flat_map(in_window).collect()
 }
@@ -181,17 +181,17 @@ fn solve(
     (first, Spline::new(&steps, [start, end]).solve())
 }
 
-/// The shortest duration, seconds. Shorter intervals count as this long, so that their rates stay finite.
+/// The shortest duration in seconds. Shorter intervals count as this long, so that their rates stay finite.
 const SHORTEST: f64 = 1e-150;
 
-/// The longest step, radians, next to which equations are solved. Up to this length, each equation has more weight on
+/// The longest step in radians next to which equations are solved. Up to this length, each equation has more weight on
 /// the velocity at its key than on those at its neighbours. Shortest paths are at most pi. Next to steps of nearly
 /// 360°, the solutions of the linear equations grow without bound from key to key.
 const LONGEST: f64 = 3.5;
 
 /// One interval of a track.
 struct Step {
-    /// Its length, seconds.
+    /// Its length in seconds.
     duration: f64,
     chart: Chart,
     /// The factors of [`Step::bend`].
@@ -398,7 +398,7 @@ impl KeyEquation {
         self.lower * before + velocity * self.diagonal + self.upper * behind - self.right
     }
 
-    /// The magnitude of the equation's terms, radians per second.
+    /// The magnitude of the equation's terms in radians per second.
     fn size(&self, [before, velocity, behind]: [DVec3; 3]) -> f64 {
         let beside = (self.lower * before).length() + (self.upper * behind).length();
         velocity.length() + (beside + self.right.length()) / self.diagonal

@@ -84,7 +84,7 @@ pub(crate) enum EndCondition {
     Parabolic,
     Natural,
     Secant,
-    /// Half of an angular velocity, radians per second.
+    /// Half of an angular velocity in radians per second.
     Clamped(Vector),
 }
 

@@ -99,9 +99,9 @@ pub struct Method {
     pub formula: &'static str,
     /// The source of the formula.
     pub source: &'static str,
-    /// The smoothness where segments meet, for any key times.
+    /// The smoothness where intervals meet, for any key times.
     pub continuity: Continuity,
-    /// The smoothness where segments meet, for keys that are evenly spaced in time.
+    /// The smoothness where intervals meet, for keys that are evenly spaced in time.
     pub continuity_on_even_keys: Continuity,
     /// The key times for which a rotation at constant angular velocity keeps this velocity.
     pub keeps_constant_velocity: Keys,
@@ -247,8 +247,8 @@ impl SmoothCurves {
     }
 }
 
-/// The smoothness of a curve where its segments meet. Specified tangents, tension or continuity of keys may make it
-/// less smooth than its method.
+/// The smoothness of a curve at its keys, where intervals meet. With specified tangents, tension or continuity of keys,
+/// a curve may be less smooth than its method says.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[non_exhaustive]
 pub enum Continuity {
@@ -316,8 +316,8 @@ const _: () = {
 };
 
 impl Method {
-    /// The textbook definition in f64. It is not a field of the method, so that only programs that compare with the
-    /// reference link it.
+    /// The textbook definition in f64. This is a function and not a field, so that only programs that compare with the
+    /// reference contain the code of the reference.
     #[must_use]
     #[allow(clippy::missing_panics_doc)] // every method has one, or the engine does not compile
     pub fn reference(&self) -> Definition {

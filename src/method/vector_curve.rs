@@ -85,7 +85,7 @@ impl<'a> VectorCurves<'a> {
         self.key(i + 1) - self.key(i)
     }
 
-    /// The time from key `i` to the next, seconds.
+    /// The time from key `i` to the next in seconds.
     pub(crate) fn duration(&self, i: usize) -> f64 {
         self.track.times[i + 1] - self.track.times[i]
     }

@@ -26,7 +26,7 @@ pub(crate) struct Representation {
     components: &'static [&'static str],
     /// The indices of the components that are angles in degrees.
     angles: Range<usize>,
-    /// The maximum angle between a rotation and its decoded value, radians; `None` if rotations cannot be stored.
+    /// The maximum angle in radians between a rotation and its decoded value; `None` if rotations cannot be stored.
     pub(crate) error_bound: Option<f64>,
     /// Whether velocities and accelerations can be stored.
     pub(crate) takes_vectors: bool,
@@ -154,13 +154,13 @@ macro_rules! representations {
 }
 
 representations! {
-    /// `x y z w`, f32: 16 bytes a rotation.
+    /// `x y z w`, f32: 16 bytes per rotation.
     #[default]
     F32 {
         kinds: [Self::F32],
         ..QUATERNION
     }
-    /// `x y z w` in IEEE 754 half precision, rounded to nearest, ties to even: 8 bytes a
+    /// `x y z w` in IEEE 754 half precision, rounded to nearest, ties to even: 8 bytes per
     /// rotation, within 2^-12 of each component.
     F16 {
         kinds: [Self::F16],
@@ -173,7 +173,7 @@ representations! {
         ..OF_ROTATIONS
     }
     /// `x y z w` as multiples of 1/32767 in 16 bits, rounded to nearest, ties to even
-    /// (`VK_FORMAT_R16G16B16A16_SNORM`): 8 bytes a rotation, within 1.6e-5 of each component.
+    /// (`VK_FORMAT_R16G16B16A16_SNORM`): 8 bytes per rotation, within 1.6e-5 of each component.
     Snorm16 {
         kinds: [Self::Snorm16],
         name: "snorm16",
@@ -317,9 +317,9 @@ impl Default for EncodingOptions {
 pub struct EncodingLengthError {
     /// The number of rotations.
     pub rotations: usize,
-    /// The length of the memory, bytes.
+    /// The length of the memory in bytes.
     pub bytes: usize,
-    /// The required length, bytes.
+    /// The required length in bytes.
     pub needed: usize,
 }
 

@@ -81,11 +81,11 @@ pub enum PoseError {
     Buffer {
         /// The input or the result.
         operand: PassOperand,
-        /// The start of the range, bytes.
+        /// The start of the range in bytes.
         offset: u64,
-        /// The length of the range, bytes.
+        /// The length of the range in bytes.
         size: u64,
-        /// The required length, bytes.
+        /// The required length in bytes.
         needed: u64,
         /// The range must start at a multiple of this number of bytes.
         step: u64,
@@ -136,7 +136,7 @@ impl fmt::Display for PassOperand {
 }
 
 /// The alignment of buffer ranges that works on every device: the maximum of Vulkan's limit
-/// `minStorageBufferOffsetAlignment`, bytes.
+/// `minStorageBufferOffsetAlignment` in bytes.
 pub(crate) const OFFSET_STEP: u64 = 256;
 
 /// Refuses weights of a blend that are not finite, or are too large.

@@ -8,7 +8,7 @@ use crate::output::rotations::Layout;
 /// The purpose in [`OutOfMemoryError`].
 const LABEL: &str = "scalars";
 
-/// A number for every scalar of a set at every sample, such as the angles of a robot's joints, rad.
+/// A number for every scalar of a set at every sample, such as the angles of a robot's joints in rad.
 #[derive(Clone, PartialEq)]
 pub struct Scalars {
     values: Vec<f32>,

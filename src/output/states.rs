@@ -52,7 +52,8 @@ impl StateArray {
         }
     }
 
-    /// The ranges of arrays in a result, bytes, for so many joints of instances. Each starts where a kernel can bind it.
+    /// The ranges in bytes of arrays in a result, for so many joints of instances. Each starts where a kernel can bind
+    /// it.
     pub(crate) fn ranges(arrays: &[Self], joints: usize) -> Vec<Range<u64>> {
         let mut end = 0u64;
         let range = |array: &Self| {

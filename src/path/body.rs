@@ -33,7 +33,7 @@ pub(crate) struct BodyOnPath {
     /// The pieces of all carried frames.
     pieces: Vec<CarriedPiece>,
     rolls: Vec<Rolls>,
-    /// The largest roll of a minimal frame after one round, radians, if the roll is kept.
+    /// The largest roll in radians of a minimal frame after one round, if the roll is kept.
     pub(crate) left_over: f64,
     up: DVec3,
     body_axes: DQuat,

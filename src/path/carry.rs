@@ -61,7 +61,7 @@ impl RelativePieces {
         let mut done = 0;
         while done < waiting.len() {
             if stop::is_stopped() {
-                // If the work was stopped, the preparation finds this out when this returns.
+                // The work was stopped; the caller notices it after this function has returned.
                 (pieces, counts) = (Vec::new(), vec![0; stretches.len()]);
                 break;
             }

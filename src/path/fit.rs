@@ -67,7 +67,7 @@ pub(crate) fn fit(prepared: &mut Prepared, spans: &[Span], sampler: &mut Sampler
     let mut block: Vec<PendingSpan> = Vec::with_capacity(MAX_LANES);
     let mut block_spans: Vec<Span> = Vec::with_capacity(MAX_LANES);
     let mut lanes = Box::new(FittedLanes::zeroed());
-    // If the work was stopped, the preparation finds this out when this returns.
+    // If the work was stopped, the caller notices it after this function has returned.
     while !waiting.is_empty() && !stop::is_stopped() {
         block.clear();
         block.extend(waiting.drain(waiting.len().saturating_sub(MAX_LANES)..));

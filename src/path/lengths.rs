@@ -34,7 +34,7 @@ impl Lengths {
             ends.sort_by(f64::total_cmp);
             let mut marks = vec![(0.0, total)];
             if stop::is_stopped() {
-                // If the work was stopped, the preparation finds this out when this returns.
+                // The work was stopped; the caller notices it after this function has returned.
                 marks.push((1.0, total));
                 lengths.marks.push(marks);
                 continue;

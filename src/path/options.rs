@@ -33,8 +33,8 @@ use crate::threads::stop::StoppedError;
 pub struct Follow {
     /// The curve through the points.
     pub method: VectorMethod,
-    /// The ends of the curve. With [`Ends::Loop`] the path is closed: its last point equals the first, and its last
-    /// pose equals the first.
+    /// The ends of the curve. With [`Ends::Loop`] the path is closed: the last point must equal the first, and the last
+    /// pose equals the first pose.
     pub ends: Ends,
     /// The direction in which a body faces.
     pub direction: Direction,

@@ -117,7 +117,7 @@ pub(crate) fn stretches(
     let mut cuts: Vec<f64> = Vec::new();
     for interval in 0..timed_path.curves.len() {
         if stop::is_stopped() {
-            // If the work was stopped, the preparation finds this out when this returns.
+            // The work was stopped; the caller notices it after this function has returned.
             return Vec::new();
         }
         let slope = &timed_path.slopes[interval];

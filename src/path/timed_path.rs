@@ -24,7 +24,7 @@ pub(crate) struct TimedPath {
     /// Empty until they are [measured](Self::measure).
     pub(crate) lengths: Lengths,
     pub(crate) speed: PathSpeed,
-    /// The times of the keys, seconds.
+    /// The times of the keys in seconds.
     pub(crate) times: Vec<f64>,
     pub(crate) is_closed: bool,
     /// The size of the path: the diagonal of its box.
@@ -137,7 +137,7 @@ impl TimedPath {
             .collect()
     }
 
-    /// The start and the end of the path, seconds.
+    /// The start and the end of the path in seconds.
     pub(crate) fn span(&self) -> (f64, f64) {
         (self.times[0], self.times[self.times.len() - 1])
     }

@@ -42,13 +42,13 @@ impl Engine {
     /// ```
     ///
     /// # Errors
-    /// When a track has no path or cannot be followed as requested, the frames do not fit the set, or the device
-    /// fails.
+    /// When a track has no path or cannot be followed as requested, the sample times do not fit the set
+    /// ([`SampleTimes::resolve`]), or the device fails.
     pub fn follow(
         &self,
         set: &TrackSet,
         follow: &Follow,
-        frames: &SampleTimes,
+        times: &SampleTimes,
         layout: Layout,
     ) -> Result<Followed, Error> {
         let group_bytes = self.machine.limits().group_bytes;
@@ -60,8 +60,8 @@ impl Engine {
             error => Error::Follow(error),
         })?;
         Ok(Followed {
-            positions: self.samples_of(prepared.positions, frames, layout)?,
-            rotations: self.samples_of(prepared.rotations, frames, layout)?,
+            positions: self.samples_of(prepared.positions, times, layout)?,
+            rotations: self.samples_of(prepared.rotations, times, layout)?,
             warnings: prepared.warnings,
         })
     }

@@ -46,8 +46,10 @@ impl Engine {
     /// ```
     ///
     /// # Errors
-    /// When translations, rotations and scales differ in tracks or samples, the skeleton, the inverse bind matrices
-    /// or `has_translation` do not fit the tracks, or there is not enough memory.
+    /// * When translations, rotations and scales differ in the number of tracks or samples.
+    /// * When the skeleton, the inverse bind matrices or `has_translation` have another number of joints than there are
+    ///   tracks.
+    /// * When there is not enough memory.
     #[doc(alias = "skinning")]
     #[doc(alias = "model space")]
     #[doc(alias = "object space")]

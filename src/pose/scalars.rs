@@ -45,17 +45,17 @@ impl Engine {
         quantity: ScalarQuantity,
         method: VectorMethod,
         interpolation: impl Into<Interpolation>,
-        frames: &SampleTimes,
+        times: &SampleTimes,
         layout: Layout,
     ) -> Result<Scalars, Error> {
         let interpolation = interpolation.into();
         let count = set.scalar_count();
-        let timeline = frames.resolve(count, set.time_span())?;
+        let timeline = times.resolve(count, set.time_span())?;
         let request = self.vector_request(quantity, method, &interpolation, &timeline)?;
         let packs = set.scalar_packs(timeline.is_per_track());
         let data = ClipData::of_scalars(set, &packs, &request)?;
-        let times = |pack: usize| set.scalar(packs[pack]).map_or(&[][..], |first| first.times);
-        let of_packs = self.vector_samples(data, &request, &timeline, layout, times)?;
+        let key_times = |pack: usize| set.scalar(packs[pack]).map_or(&[][..], |first| first.times);
+        let of_packs = self.vector_samples(data, &request, &timeline, layout, key_times)?;
         let samples = timeline.len();
         let mut scalars = Scalars::new(count, samples, layout)?;
         let pack_of = |scalar: usize| packs.partition_point(|&first| first <= scalar) - 1;
@@ -107,17 +107,17 @@ impl Engine {
         quantity: ScalarQuantity,
         method: VectorMethod,
         interpolation: impl Into<Interpolation>,
-        frames: &SampleTimes,
+        times: &SampleTimes,
         layout: Layout,
     ) -> Result<Vectors, Error> {
         let interpolation = interpolation.into();
         let tracks = set.track_count();
-        let timeline = frames.resolve(tracks, set.time_span())?;
+        let timeline = times.resolve(tracks, set.time_span())?;
         let request = self.vector_request(quantity, method, &interpolation, &timeline)?;
         let data = ClipData::of_vectors(set, channel, &request)?;
-        let times =
+        let key_times =
             |track: usize| (set.vectors(channel, track)).map_or(&[][..], |keys| &keys.times);
-        self.vector_samples(data, &request, &timeline, layout, times)
+        self.vector_samples(data, &request, &timeline, layout, key_times)
     }
 
     /// Evaluates prepared vectors. `times` are the key times of a track, empty if it has none: in mirrored copies of

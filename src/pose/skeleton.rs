@@ -24,8 +24,9 @@ impl Skeleton {
     /// Offsets are in the parent's frame; those of roots are in the world.
     ///
     /// # Errors
-    /// When the numbers of parents and offsets differ, an offset is not finite, a parent does not exist, the parents
-    /// contain a cycle, or there is not enough memory.
+    /// * When the numbers of parents and offsets differ, or an offset is not finite.
+    /// * When a parent does not exist, or a joint is its own ancestor.
+    /// * When there is not enough memory.
     pub fn new(parents: Vec<Option<usize>>, offsets: Vec<Vec3>) -> Result<Self, SkeletonError> {
         let tracks = parents.len();
         if tracks > MAX_TRACKS {

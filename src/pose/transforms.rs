@@ -58,19 +58,19 @@ impl Engine {
         set: &TrackSet,
         interpolations: impl Into<PerTrack<Interpolation>>,
         vectors: impl Into<PerTrack<VectorMethod>>,
-        frames: &SampleTimes,
+        times: &SampleTimes,
         layout: Layout,
     ) -> Result<Transforms, Error> {
         let (interpolations, vectors) = (interpolations.into(), vectors.into());
         let evaluate = |channel| {
             let (vectors, interpolations) = (vectors.clone(), interpolations.clone());
-            self.vectors(set, channel, vectors, interpolations, frames, layout)
+            self.vectors(set, channel, vectors, interpolations, times, layout)
         };
         Ok(Transforms {
             translations: evaluate(Channel::Translation)?,
             scales: evaluate(Channel::Scale)?,
             rotations: self
-                .request(set, interpolations, frames)
+                .request(set, interpolations, times)
                 .layout(layout)
                 .evaluate()?,
             has_translation: (0..set.track_count())
@@ -89,12 +89,12 @@ impl Engine {
         channel: Channel,
         methods: impl Into<PerTrack<VectorMethod>>,
         interpolations: impl Into<PerTrack<Interpolation>>,
-        frames: &SampleTimes,
+        times: &SampleTimes,
         layout: Layout,
     ) -> Result<Vectors, Error> {
         let tracks = set.track_count();
         let all = methods.into().zip(interpolations.into(), tracks)?;
-        let timeline = frames.resolve(tracks, set.time_span())?;
+        let timeline = times.resolve(tracks, set.time_span())?;
         if let Some((method, interpolation)) = all.uniform(tracks) {
             let clip = self.clip_of_vectors(set, channel, method, interpolation, &timeline)?;
             return clip.samples(&timeline, layout);
@@ -141,11 +141,11 @@ impl Engine {
     pub(super) fn samples_of<T>(
         &self,
         data: ClipData,
-        frames: &SampleTimes,
+        times: &SampleTimes,
         layout: Layout,
     ) -> Result<Samples<T>, Error> {
         let clip = self.clip_of(data)?;
-        clip.samples(&clip.timeline(frames)?, layout)
+        clip.samples(&clip.timeline(times)?, layout)
     }
 
     pub(super) fn clip_of(&self, data: ClipData) -> Result<Clip, Error> {

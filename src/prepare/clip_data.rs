@@ -41,7 +41,7 @@ pub(crate) struct ClipData {
     parts: Vec<(u32, u32)>,
     /// The start of each track's parts in `parts`, and the end of the last track's.
     tracks: Vec<usize>,
-    /// The first and the last key time of the set, seconds.
+    /// The first and the last key time of the set in seconds.
     pub(crate) time_span: Option<(f64, f64)>,
     /// See [`ClipData::time_classes`].
     time_classes: OnceLock<Vec<u32>>,

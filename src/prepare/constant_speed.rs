@@ -12,14 +12,14 @@ use crate::threads::stop;
 use crate::time::runs::NONE;
 use crate::time::spans::{SpanSource, TrackPart};
 
-/// The largest angle that has no effect on results in f32, radians.
+/// The largest angle in radians that has no effect on results in f32.
 const VISIBLE: f64 = 1e-8;
 
 /// An interval of a track whose other intervals are not complete yet.
 pub(crate) struct PendingInterval {
     /// Its part of the prepared tracks.
     pub(crate) part: usize,
-    /// The start according to the key times, seconds.
+    /// The start according to the key times in seconds.
     pub(crate) start: f64,
     /// The constant to store at exactly the start, or [`NONE`].
     pub(crate) key: u32,

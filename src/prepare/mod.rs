@@ -47,7 +47,7 @@
 //! starts     0.0   0.5   1.0   0.0   0.7  …   seconds, f64
 //! sources    seg 0 seg 1 exact seg 2 con 5…   index of a segment, a constant or an exact curve
 //! keys       0     1     -     3     4    …   the constant to store at exactly the start
-//! segments   32 bytes an arc, 176 a polynomial; packed 112, 144 or 176
+//! segments   32 bytes per arc, 176 per polynomial; packed 112, 144 or 176
 //! constants  16 bytes: keys, and values held at ends
 //! exact      curves that no polynomial fits, and those outside the keys: the host evaluates them in f64
 //! ```

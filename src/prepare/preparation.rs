@@ -161,7 +161,7 @@ pub(crate) enum Batch {
         track: usize,
         intervals: Range<usize>,
     },
-    /// The intervals of some tracks that contain samples between two times, seconds, and some intervals next to them:
+    /// The intervals of some tracks that contain samples between two times in seconds, and some intervals next to them:
     /// a time within rounding of a key may be on either side of it.
     Span {
         tracks: Range<usize>,

@@ -115,7 +115,7 @@ impl SmoothPreparation {
             _ => Vec::new(),
         };
         let mut from = intervals.start;
-        // If the work was stopped, the caller finds this out itself.
+        // If the work was stopped, the caller notices it after this function has returned.
         while from < intervals.end && !stop::is_stopped() {
             if self.intervals.count + context >= LANES {
                 self.flush(prepared);

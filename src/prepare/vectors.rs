@@ -36,7 +36,7 @@ pub(crate) struct VectorRequest<'a> {
     pub(crate) method: VectorMethod,
     /// The ends and the wrap modes.
     pub(crate) interpolation: &'a Interpolation,
-    /// The largest size of a group's segments, bytes.
+    /// The largest size of a group's segments in bytes.
     pub(crate) group_bytes: Option<usize>,
     /// The only timeline that will be sampled; keys on which no sample of it depends may be left out.
     pub(crate) only_for: Option<&'a Timeline>,

@@ -76,7 +76,7 @@ pub enum ReduceError {
     Time {
         /// The time's index, from 0.
         index: usize,
-        /// The time, seconds.
+        /// The time in seconds.
         time: f64,
     },
     /// A sample is not finite, or is a rotation with norm 0.
@@ -107,8 +107,9 @@ pub enum ReduceError {
 /// ```
 ///
 /// # Errors
-/// When the numbers of times and samples differ, the times are not finite and increasing, a sample is not finite or
-/// has norm 0, or the tolerance is negative or not finite.
+/// * When the numbers of times and samples differ, or the times are not finite and increasing.
+/// * When a sample is not finite or has norm 0.
+/// * When the tolerance is negative or not finite.
 pub fn reduce_rotations(
     times: &[f64],
     samples: &[DQuat],

@@ -77,7 +77,7 @@ struct System<'a> {
 /// The strength up to which bends are used first; half as strong if no solution is found, and so on.
 const STRONGEST: f64 = 1024.0;
 const WEAKEST: f64 = 0.5;
-/// The longest step, radians, next to which equations are solved.
+/// The longest step in radians next to which equations are solved.
 const LONGEST: f64 = 3.5;
 /// The smallest part by which the bends are increased.
 const LEAST_PART: f64 = 1.0 / 1024.0;

@@ -101,7 +101,7 @@ impl ReferenceCurve {
         }
     }
 
-    /// The rotation at a time, seconds. Before the first key and after the last it is the value there.
+    /// The rotation at a time in seconds. Before the first key and after the last it is the value there.
     #[must_use]
     pub fn rotation(&self, time: f64) -> DQuat {
         let last = self.track.last();
@@ -118,7 +118,7 @@ impl ReferenceCurve {
         self.segments[i].rotation(t)
     }
 
-    /// The angular velocity in the body frame, radians per second; zero outside the keys. At a key it is that of the
+    /// The angular velocity in the body frame in radians per second; zero outside the keys. At a key it is that of the
     /// later segment.
     #[must_use]
     pub fn velocity(&self, time: f64) -> DVec3 {
@@ -137,7 +137,7 @@ impl ReferenceCurve {
         }
     }
 
-    /// The angular acceleration in the body frame, radians per second squared; zero outside the keys. At a key it is
+    /// The angular acceleration in the body frame in radians per second squared; zero outside the keys. At a key it is
     /// that of the later segment.
     #[must_use]
     pub fn acceleration(&self, time: f64) -> DVec3 {

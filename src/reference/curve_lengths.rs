@@ -5,7 +5,7 @@ use crate::reference::segment::Segment;
 /// The number of panels of each segment; each is integrated by Gauss quadrature with three points.
 const PANELS: usize = 256;
 
-/// Lengths of curves, radians.
+/// Lengths of curves in radians.
 pub(crate) struct CurveLengths {
     /// The arc length at the end of every panel of every segment.
     lengths: Vec<f64>,

@@ -60,7 +60,7 @@ pub struct Follower {
     pub up: DVec3,
     /// Upward directions at keys; may be empty.
     pub ups: Vec<Option<DVec3>>,
-    /// Whether the path is closed, and the roll that its frame has gained after one round is removed evenly over it.
+    /// Whether the roll that the frame has gained after one round of a closed path is removed, evenly over the path.
     pub spread: bool,
     /// The speed on the path.
     pub travel: FollowerSpeed,
@@ -76,7 +76,7 @@ pub struct FollowerWalk<'a> {
     lengths: Vec<f64>,
     /// Rolls to add, by length: (length, angle, slope).
     rolls: Vec<[f64; 3]>,
-    /// The roll of the frame, radians: after one round, or relative to the last upward direction of a key.
+    /// The roll of the frame in radians: after one round, or relative to the last upward direction of a key.
     pub left_over: f64,
 }
 
@@ -160,7 +160,7 @@ impl FollowerWalk<'_> {
         self.lengths[self.lengths.len() - 1]
     }
 
-    /// Position and rotation at a time, seconds. The rotation maps z to the forward direction and y to the upward
+    /// Position and rotation at a time in seconds. The rotation maps z to the forward direction and y to the upward
     /// direction.
     #[must_use]
     pub fn pose(&self, time: f64) -> (DVec3, DQuat) {

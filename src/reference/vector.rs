@@ -12,7 +12,7 @@ pub struct VectorCurve {
     pub method: &'static str,
     /// The curve at the ends; clamped ends are at rest.
     pub ends: Ends,
-    /// The key times, seconds.
+    /// The key times in seconds.
     pub times: Vec<f64>,
     /// A vector for each time.
     pub keys: Vec<DVec3>,
@@ -21,7 +21,7 @@ pub struct VectorCurve {
 }
 
 impl VectorCurve {
-    /// The vector at a time, seconds. Before the first key and after the last it is the value there.
+    /// The vector at a time in seconds. Before the first key and after the last it is the value there.
     #[must_use]
     pub fn value(&self, time: f64) -> DVec3 {
         let last = self.keys.len() - 1;
@@ -56,7 +56,7 @@ impl VectorCurve {
         [by_parameter / h, twice / (h * h)]
     }
 
-    /// The time from key `i` to the next, seconds.
+    /// The time from key `i` to the next in seconds.
     fn step(&self, i: usize) -> f64 {
         self.times[i + 1] - self.times[i]
     }

@@ -96,7 +96,7 @@ pub enum SmoothingError {
         0.5 * rate
     )]
     Frequency {
-        /// The frequency, Hz.
+        /// The frequency in Hz.
         hz: f64,
         /// The number of samples per second.
         rate: f64,

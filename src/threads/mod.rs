@@ -51,11 +51,11 @@ thread_local! {
     static IS_WORKER: Cell<bool> = const { Cell::new(false) };
 }
 
-/// The size of a worker's stack, bytes. A worker that waits for parts of its work runs tasks of other calls on the
+/// The size of a worker's stack in bytes. A worker that waits for parts of its work runs tasks of other calls on the
 /// same stack, as many as there are at a time.
 const STACK: usize = 4 << 20;
 
-/// The memory that a new thread surely needs in addition to its stack, bytes.
+/// The memory in bytes that a new thread surely needs in addition to its stack.
 const BEGINNING: usize = 1 << 20;
 
 /// Whether the target has threads. WebAssembly has none as Rust compiles for it: the calling thread does all work,

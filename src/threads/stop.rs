@@ -44,9 +44,9 @@ impl Stop {
         current().unwrap_or_default()
     }
 
-    /// Stops the work inside [`Stop::during`]: within some hundredths of a second its evaluations return
-    /// [`Error::Stopped`](crate::Error::Stopped), and so does each evaluation that it starts later. A partly written
-    /// result must not be used.
+    /// Stops the work inside [`Stop::during`]: within some hundredths of a second, the evaluations of this work return
+    /// [`Error::Stopped`](crate::Error::Stopped), and so does each evaluation that the work starts later. A partly
+    /// written result must not be used.
     pub fn stop(&self) {
         self.0.store(true, Ordering::Relaxed);
     }
@@ -57,7 +57,7 @@ impl Stop {
         self.0.load(Ordering::Relaxed)
     }
 
-    /// Does work on this thread that this flag can stop.
+    /// Does `work` on the calling thread; [`Stop::stop`] of this flag stops it.
     pub fn during<R>(&self, work: impl FnOnce() -> R) -> R {
         during(Some(self.clone()), work)
     }

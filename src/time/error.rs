@@ -18,9 +18,9 @@ pub enum SampleTimesError {
     /// The range ends before it starts.
     #[error("the range ends at {end} s, before it starts at {start} s")]
     ReversedRange {
-        /// The start, seconds.
+        /// The start in seconds.
         start: f64,
-        /// The end, seconds.
+        /// The end in seconds.
         end: f64,
     },
     /// A range was set for explicit times.
@@ -54,7 +54,7 @@ pub enum SampleTimesError {
         tracks: usize,
         /// The number of samples of each track.
         frames: f64,
-        /// The size of the result, bytes.
+        /// The size of the result in bytes.
         bytes: f64,
     },
     /// Two neighbouring keys are so far apart that 32 bits cannot count the frames between them.

@@ -62,7 +62,7 @@ impl SampleTimes {
         })
     }
 
-    /// The same rate from `from` to `to`, seconds. Explicit times cannot have a range; [`SampleTimes::resolve`]
+    /// The same rate from `from` to `to` in seconds. Explicit times cannot have a range; [`SampleTimes::resolve`]
     /// refuses it ([`SampleTimesError::TimesInRange`]).
     #[must_use]
     pub fn between(mut self, from: f64, to: f64) -> Self {
@@ -84,24 +84,32 @@ impl SampleTimes {
         self
     }
 
-    /// Explicit times, seconds, in any order, the same for every track.
+    /// Explicit times in seconds, in any order, the same for every track.
     #[must_use]
     #[doc(alias = "sample times")]
     pub fn at(times: Vec<f64>) -> Self {
         Self(SampleTimesKind::Shared(Arc::new(times)))
     }
 
-    /// Explicit times for each track, seconds: first all times of the first track, then those of the second, and so
+    /// Explicit times for each track in seconds: first all times of the first track, then those of the second, and so
     /// on. Each track has the same number of times.
     #[must_use]
     pub fn at_each(times: Vec<f64>) -> Self {
         Self(SampleTimesKind::PerTrack(Arc::new(times)))
     }
 
-    /// Computes the sample times for a set with `tracks` tracks, whose first and last key times are `span`, seconds.
+    /// Computes the sample times for a set with `tracks` tracks. `span` is the times of its first and last key in
+    /// seconds.
     ///
     /// # Errors
-    /// When the sample times do not fit the set.
+    /// * [`SampleTimesError::Rate`] when the rate is 0.
+    /// * [`SampleTimesError::TimeNotFinite`] when a time is NaN or infinite.
+    /// * [`SampleTimesError::ReversedRange`] when the end is before the start.
+    /// * [`SampleTimesError::TimesInRange`] when [`SampleTimes::between`] was called for explicit times.
+    /// * [`SampleTimesError::Uneven`] when times are listed for each track ([`SampleTimes::at_each`]), and their number
+    ///   is not a multiple of the number of tracks.
+    /// * [`SampleTimesError::TooMany`] when there are more than 2^40 samples of a track, or more values than memory can
+    ///   address.
     pub fn resolve(
         &self,
         tracks: usize,
@@ -264,7 +272,7 @@ impl Timeline {
         })
     }
 
-    /// The time of a sample, seconds. `None` if the sample is out of range, or if times are listed for each track and
+    /// The time of a sample in seconds. `None` if the sample is out of range, or if times are listed for each track and
     /// the track is out of range.
     #[must_use]
     pub fn time(&self, track: usize, sample: usize) -> Option<f64> {
@@ -275,7 +283,7 @@ impl Timeline {
         (has_times && sample < self.count).then(|| self.time_at(track, sample))
     }
 
-    /// The times of all samples of a track, seconds. Empty if times are listed for each track and the track is out of
+    /// The times of all samples of a track in seconds. Empty if times are listed for each track and the track is out of
     /// range.
     #[must_use]
     pub fn times(&self, track: usize) -> impl ExactSizeIterator<Item = f64> {

@@ -83,7 +83,7 @@ pub(crate) struct TrackPart {
     /// The index of its first key in the track.
     pub(crate) first_key: u32,
     pub(crate) spans: Range<usize>,
-    /// Where the last span ends, seconds.
+    /// Where the last span ends in seconds.
     pub(crate) end: f64,
     /// The constant held before the first key; [`NONE`] when another part has it.
     pub(crate) before: u32,
@@ -102,7 +102,7 @@ pub(crate) struct TrackExtension {
     /// Their parameter is seconds from that key; [`NONE`] where constants are held.
     pub(crate) from_before: u32,
     pub(crate) from_after: u32,
-    /// The start and the end of the whole track, seconds.
+    /// The start and the end of the whole track in seconds.
     pub(crate) span: (f64, f64),
 }
 
@@ -200,8 +200,8 @@ impl Spans {
         rate: f64,
     ) -> SampleTimesError {
         let (starts, keys) = (&self.starts, &self.keys);
-        // An interval may be divided into several spans, and only the first one starts at a key. For curves that do
-        // not pass through their keys this is not known, so each span counts as an interval.
+        // An interval may be divided into several spans, and only the first one starts at a key. For curves that do not
+        // pass through their keys, it is not known which spans start at a key, so each span counts as an interval.
         let meets_keys = keys[part.spans.clone()].iter().any(|&key| key != NONE);
         let is_at_key = |&span: &usize| {
             let stands = matches!(self.source(span), SpanSource::Constant(_));

@@ -64,7 +64,7 @@ impl Wrap {
         self.before.repeats() || self.after.repeats()
     }
 
-    /// The samples of a track, divided where its copies meet. `span` is the times of its first and last key, seconds;
+    /// The samples of a track, divided where its copies meet. `span` is the times of its first and last key in seconds;
     /// `None` if it has no copies. The copy of a sample does not depend on the other samples of the request.
     #[inline]
     pub(crate) fn copies(
@@ -115,7 +115,7 @@ impl Wrap {
     }
 
     /// Whether a sample is in a copy of its track that runs backwards. `span` is the times of the track's first and
-    /// last key, seconds.
+    /// last key in seconds.
     pub(crate) fn is_backwards(
         self,
         span: (f64, f64),

@@ -4,7 +4,7 @@
 /// other keys, because they are probably not rotations.
 pub const NORM_TOLERANCE: f64 = 0.1;
 
-/// The largest magnitude of a time, seconds: the limit of `.dat` files. With it, products of intervals do not
+/// The largest magnitude of a time in seconds: the limit of `.dat` files. With it, products of intervals do not
 /// overflow in f64.
 pub(crate) const LATEST: f64 = f32::MAX as f64;
 
@@ -35,7 +35,7 @@ pub enum TrackError {
         track: usize,
         /// The key's index in the track.
         key: usize,
-        /// The refused time, seconds.
+        /// The refused time in seconds.
         time: f64,
     },
     /// A time is so large that computations would overflow.
@@ -45,7 +45,7 @@ pub enum TrackError {
         track: usize,
         /// The key's index in the track.
         key: usize,
-        /// The refused time, seconds.
+        /// The refused time in seconds.
         time: f64,
     },
     /// A time is not after the previous one.
@@ -57,9 +57,9 @@ pub enum TrackError {
         track: usize,
         /// The key's index in the track.
         key: usize,
-        /// The refused time, seconds.
+        /// The refused time in seconds.
         time: f64,
-        /// The previous time, seconds.
+        /// The previous time in seconds.
         previous: f64,
     },
     /// The norm of a quaternion is not close to 1.

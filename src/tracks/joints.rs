@@ -216,9 +216,8 @@ impl Joints {
         })
     }
 
-    /// Adds the joints of the other clip that this one does not have, behind those that it has, and returns the index
-    /// here of each joint of the other. `clips` are the names of this clip and the other in messages. Joints whose
-    /// parents are not known become roots.
+    /// Appends the joints that only the other clip has, and returns, for each joint of the other clip, its index here.
+    /// `clips` are the names of this clip and the other in messages. Joints whose parents are not known become roots.
     ///
     /// # Errors
     /// As [`Joints::pairs`]; also when a joint of both has another parent in the other clip. The joints are then unchanged.

@@ -72,7 +72,7 @@ pub struct Track<'a> {
     pub times: &'a [f64],
     /// Keys as unit quaternions, one for each time.
     pub keys: &'a [Quat],
-    /// Angular velocities at the keys, rad/s in the body frame; empty if none were set.
+    /// Angular velocities at the keys in rad/s in the body frame; empty if none were set.
     pub velocities: &'a [DVec3],
     /// The incoming and outgoing tangent of each key, `x y z w` per second; empty if none were set.
     pub tangents: &'a [[Quat; 2]],
@@ -322,7 +322,7 @@ impl TrackSet {
         Ok(())
     }
 
-    /// The first and the last key time of all tracks and scalars, seconds; `None` if there are none.
+    /// The first and the last key time of all tracks and scalars in seconds; `None` if there are none.
     #[must_use]
     pub fn time_span(&self) -> Option<(f64, f64)> {
         self.span

@@ -29,17 +29,17 @@ pub struct Comparison {
     pub of_other_sign: u64,
     /// The first rotation whose bits differ.
     pub first_difference: Option<SamplePosition>,
-    /// The largest angle between the compared rotations and the reference, radians.
+    /// The largest angle in radians between the compared rotations and the reference.
     pub max_error: f64,
-    /// The root mean square of that angle, radians.
+    /// The root mean square of that angle in radians.
     pub rms_error: f64,
     /// The sample with the largest error.
     pub worst: Option<SamplePosition>,
     /// The largest | |q| - 1 | of the compared rotations.
     pub max_norm_error: f64,
-    /// The largest angle between the engine's result and the reference, radians.
+    /// The largest angle in radians between the engine's result and the reference.
     pub engine_error: f64,
-    /// The bound of `max_error` for the engine, radians.
+    /// The bound in radians of `max_error` for the engine.
     pub error_bound: f64,
     /// The bound of `max_norm_error` for the engine.
     pub norm_bound: f64,
@@ -70,8 +70,8 @@ impl Comparison {
         self.judged(self.error_bound, self.norm_bound)
     }
 
-    /// The agreement with a bound of your choice for the angle to the reference, radians. Norms may differ from 1 by as
-    /// much, or by as much as the engine's.
+    /// The agreement with a bound of your choice for the angle to the reference in radians. Norms may differ from 1 by
+    /// as much, or by as much as the engine's.
     #[must_use]
     pub fn agreement_within(&self, radians: f64) -> Agreement {
         self.judged(radians, self.norm_bound.max(radians))

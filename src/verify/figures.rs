@@ -22,7 +22,7 @@ use crate::verify::sets::{
     SeededRandom, crowd_layer, crowd_library, shared_set, typical_layer, typical_library,
 };
 
-/// The duration of the keys of the cases, seconds: 26 keys, 0.8 s apart.
+/// The duration in seconds of the keys of the cases: 26 keys, 0.8 s apart.
 const SECONDS: f64 = 20.0;
 
 /// The rows of a crowd.
@@ -38,7 +38,7 @@ const JOINTS: usize = 60;
 pub struct Figures {
     /// The clock of the rates and of [`FigureCase::seconds`]: `device` if the device has time stamps, else `host`.
     pub clock: &'static str,
-    /// The size of each buffer that was filled and copied, bytes.
+    /// The size in bytes of each buffer that was filled and copied.
     pub buffer_bytes: u64,
     /// The rate of filling device memory (`vkCmdFillBuffer`).
     pub fill_rate: f64,
@@ -64,21 +64,21 @@ pub struct FigureCase {
     pub name: String,
     /// The number of the result's values: rotations, or joints.
     pub values: u64,
-    /// The size of the result, bytes.
+    /// The size of the result in bytes.
     pub bytes: u64,
-    /// The time of the first call, from keys to the result, including compilation of kernels, seconds.
+    /// The time in seconds of the first call, from keys to the result, including compilation of kernels.
     pub first_call: f64,
-    /// The time of later calls, seconds.
+    /// The time of later calls in seconds.
     pub seconds: f64,
-    /// The time of later calls by the host's clock, seconds.
+    /// The time of later calls in seconds by the host's clock.
     pub host_seconds: f64,
-    /// The time in which the host recorded a later call into commands, seconds; `None` if the case is not recorded.
+    /// The time in seconds in which the host recorded a later call into commands; `None` if the case is not recorded.
     pub record_seconds: Option<f64>,
-    /// The time of one of a row of calls that are recorded one after another, with a barrier between kernels, seconds;
-    /// `None` if the case is not recorded, or the device has no time stamps.
+    /// The time in seconds of one of a row of calls that are recorded one after another, with a barrier between
+    /// kernels; `None` if the case is not recorded, or the device has no time stamps.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub row_seconds: Option<f64>,
-    /// The rate of the result, bytes per second.
+    /// The rate of the result in bytes per second.
     pub rate: f64,
     /// The figure that limits the rate: `fill` or `download`.
     pub limit: &'static str,
@@ -155,7 +155,7 @@ fn measured<T>(mut run: impl FnMut() -> Result<T, Error>) -> Result<(T, Vec<T>),
     Ok((first, runs))
 }
 
-/// The time by the device's clock, if every run has it, and by the host's clock, seconds.
+/// The time in seconds by the device's clock, if every run has it, and by the host's clock.
 fn seconds(runs: &[Elapsed]) -> (Option<f64>, f64) {
     let on_device: Option<Vec<_>> = runs.iter().map(|run| run.on_device).collect();
     let on_host = runs.iter().map(|run| run.on_host).collect();
@@ -167,7 +167,7 @@ impl Bench {
         Instant::now() > self.deadline
     }
 
-    /// The time by the clock of the figures, seconds.
+    /// The time by the clock of the figures in seconds.
     fn clocked(&mut self, (on_device, on_host): (Option<f64>, f64)) -> f64 {
         if on_device.is_none() {
             self.figures.clock = "host";
@@ -179,7 +179,7 @@ impl Bench {
         Ok((self.renderer.application).buffer(size, ApplicationMemory::Device)?)
     }
 
-    /// The rate of commands that are recorded for each run, bytes per second.
+    /// The rate in bytes per second of commands that are recorded for each run.
     fn rate(
         &mut self,
         bytes: u64,

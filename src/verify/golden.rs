@@ -135,7 +135,7 @@ const SEVERAL: CrowdMix = CrowdMix {
     layers: 3,
 };
 
-/// Steps of the clock between the evaluations of a crowd, ticks. The last step is more than a day.
+/// Steps of the clock in ticks between the evaluations of a crowd. The last step is more than a day.
 const CLOCK: [u64; 4] = [0, 11_760, 1 << 33, 61_000_000_000];
 
 impl Default for Golden {

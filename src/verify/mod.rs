@@ -51,7 +51,7 @@ pub const NORM_BOUND: f64 = 4e-7;
 /// near them. At constant speed the bounds are larger ([`OutputVerification::error_bound`]).
 pub const RATE_BOUND: f64 = 2e-6;
 
-/// The bound of errors against the reference for a form, radians.
+/// The bound in radians of errors against the reference for a form.
 #[must_use]
 pub fn error_bound(form: Form) -> f64 {
     match form {
@@ -75,15 +75,15 @@ pub struct Verification {
     pub differing: u64,
     /// The first rotation whose bits differ.
     pub first_difference: Option<SamplePosition>,
-    /// The largest angle between a result and the reference, radians.
+    /// The largest angle in radians between a result and the reference.
     pub max_error: f64,
-    /// The root mean square of that angle, radians.
+    /// The root mean square of that angle in radians.
     pub rms_error: f64,
     /// The sample with the largest error.
     pub worst: Option<SamplePosition>,
     /// The largest | |q| - 1 |.
     pub max_norm_error: f64,
-    /// The bound of `max_error`, radians.
+    /// The bound of `max_error` in radians.
     pub error_bound: f64,
     /// The bound of `max_norm_error`: [`NORM_BOUND`], plus the excess of the keys' norm errors over rounding to f32.
     pub norm_bound: f64,
@@ -100,7 +100,7 @@ pub struct SamplePosition {
     pub track: usize,
     /// The index of the sample.
     pub frame: usize,
-    /// The time of the sample, seconds.
+    /// The time of the sample in seconds.
     pub time: f64,
 }
 
@@ -292,7 +292,7 @@ fn differences<T: NoUninit>(a: &[T], b: &[T], size: usize) -> (u64, Option<usize
 
 /// The errors of a result against the reference.
 struct Errors {
-    /// The largest angle, and the root mean square, radians.
+    /// The largest angle, and the root mean square in radians.
     max: f64,
     rms: f64,
     worst: Option<SamplePosition>,
@@ -337,7 +337,7 @@ impl Errors {
 /// The errors of one track against the reference.
 #[derive(Default)]
 struct TrackErrors {
-    /// The largest angle, radians, and its sample.
+    /// The largest angle in radians, and its sample.
     max: f64,
     worst: usize,
     /// The sum of the squared angles.

@@ -57,8 +57,8 @@ pub struct RendererReport {
     pub validation_messages: Vec<String>,
 }
 
-/// An application's device with an engine on it. Clips, crowds, targets and buffers of both must be dropped before
-/// it; therefore each function here makes them after it.
+/// An application's device with an engine on it. Clips, crowds, targets and buffers of both must be dropped before the
+/// device; therefore each function here makes them after the renderer.
 pub(crate) struct Renderer {
     /// Dropped before its device.
     pub(crate) engine: Engine,
@@ -72,8 +72,8 @@ impl Renderer {
         options: &EngineOptions,
     ) -> Result<Self, Error> {
         let application = Application::new(&device.info().uuid, validation)?;
-        // SAFETY: the handles belong together; the engine goes before them (`Renderer`), and its queue is used
-        // by one of the two at a time.
+        // SAFETY: the handles belong together; the engine is dropped before them (by the order of `Renderer`'s fields);
+        // and the engine and the application never use the queue at the same time.
         let engine = unsafe { Engine::from_vulkan(application.handles(), options) }?;
         Ok(Self {
             engine,
@@ -227,8 +227,8 @@ pub fn renderer(
         copy_queue_family: None,
         validation_messages: Vec::new(),
     };
-    // Under the validation layer every call takes longer. Two methods are enough, because methods differ only on the
-    // host.
+    // Under the validation layer every call takes longer. Then only the first two methods are used, which is enough,
+    // because methods differ only on the host.
     let methods = [method::SLERP, method::C2, method::BESSEL_OVERHAUSER];
     let methods = if validation { &methods[..2] } else { &methods };
     buffer_to_buffer(&mut renderer, &cpu, seed, methods, &mut report)?;

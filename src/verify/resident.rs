@@ -58,7 +58,7 @@ impl Clip {
     /// and on devices that cannot allocate the result at once.
     ///
     /// # Errors
-    /// When the frames do not fit the clip, or the device fails.
+    /// When the sample times do not fit the clip, or the device fails.
     pub fn resident(
         &self,
         frames: &SampleTimes,
@@ -98,7 +98,7 @@ fn room(engine: &VulkanEngine, bytes: u64) -> Result<Buffer, VulkanError> {
 }
 
 impl Resident<'_> {
-    /// The size of the result, bytes.
+    /// The size of the result in bytes.
     #[must_use]
     pub fn bytes(&self) -> u64 {
         self.bytes

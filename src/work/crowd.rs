@@ -482,7 +482,8 @@ mod tests {
     fn each_step_waits_for_what_it_reads() {
         let half = CrowdOutput::half(CrowdValues::Skinning);
         let unchanged = || frame(EntryChanges::None, VisibleInstances::All);
-        // No further barrier is needed before the next window: the positions were read before a later step waited.
+        // The next window may overwrite the positions without a further barrier: after they were read, a later step of
+        // this window has already waited.
         let window = "D|D|D|D|D|D";
         let expected = format!("^{window}{window}[Kernel>Any]");
         assert_eq!(steps(half, false, &unchanged()), expected);

@@ -141,7 +141,8 @@ mod tests {
             assert_eq!(instances(joints, [1, 1], matrices), Some(of_matrices));
             assert_eq!(instances(joints, [1, 1], rotations), Some(of_rotations));
         }
-        // In half precision, a line has twice as many values, and 7 × 35 values and 15 idle ones are too many.
+        // In half precision a line has 16 rotations, so up to 15 invocations are idle at its start: 7 × 35 + 15 are
+        // more than two rounds of 128 invocations.
         let half = CrowdOutput::half(CrowdValues::Rotations);
         assert_eq!(instances(7, [1, 1], half), Some(34));
     }

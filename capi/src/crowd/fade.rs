@@ -18,9 +18,9 @@ pub struct TumbleCrowdFade {
     pub instance: usize,
     /// The index of the layer in the instance, from 1: layer 0 has no weight.
     pub layer: usize,
-    /// The clock's time at which the fade starts, ticks; in the past or in the future.
+    /// The clock's time in ticks at which the fade starts; in the past or in the future.
     pub start: u64,
-    /// The duration of the fade, ticks; with 0 the weight changes at once.
+    /// The duration of the fade in ticks; with 0 the weight changes at once.
     pub ticks: u64,
     /// The weight before the fade, 0 to 1, rounded to a multiple of 2^-15.
     pub from: f32,
@@ -37,8 +37,10 @@ unsafe impl SizedStructure for TumbleCrowdFade {
 /// stay, and its fade ends.
 ///
 /// # Errors
-/// `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such instance or layer; `TUMBLE_RESULT_INVALID_ARGUMENT` if the layer
-/// is layer 0, or a weight is outside 0 to 1. After any error nothing changes.
+/// - `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such instance or layer.
+/// - `TUMBLE_RESULT_INVALID_ARGUMENT` if the layer is layer 0, or a weight is outside 0 to 1.
+///
+/// After any error nothing changes.
 #[unsafe(no_mangle)]
 pub extern "C" fn tumble_crowd_set_weight(
     crowd: *mut TumbleCrowd,
@@ -59,8 +61,10 @@ pub extern "C" fn tumble_crowd_set_weight(
 /// fade.
 ///
 /// # Errors
-/// `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such instance or layer; `TUMBLE_RESULT_INVALID_ARGUMENT` if the layer
-/// is layer 0, or a weight is outside 0 to 1. After any error nothing changes.
+/// - `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such instance or layer.
+/// - `TUMBLE_RESULT_INVALID_ARGUMENT` if the layer is layer 0, or a weight is outside 0 to 1.
+///
+/// After any error nothing changes.
 #[unsafe(no_mangle)]
 pub extern "C" fn tumble_crowd_fade(
     crowd: *mut TumbleCrowd,
@@ -82,8 +86,10 @@ pub extern "C" fn tumble_crowd_fade(
 /// weights at all times.
 ///
 /// # Errors
-/// `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such instance or layer; `TUMBLE_RESULT_INVALID_ARGUMENT` if the layer
-/// is layer 0, or a weight is outside 0 to 1. After any error nothing changes.
+/// - `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such instance or layer.
+/// - `TUMBLE_RESULT_INVALID_ARGUMENT` if the layer is layer 0, or a weight is outside 0 to 1.
+///
+/// After any error nothing changes.
 ///
 /// # Safety
 /// `fade` must point to a `TumbleCrowdFade`.

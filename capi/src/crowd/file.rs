@@ -102,7 +102,7 @@ fn authored_vector_method(motion: &Motion, clip: usize) -> Result<VectorMethod, 
 }
 
 /// Adds a clip of a file to a library. Tracks are matched to joints by name; the file may be another one than that of
-/// `tumble_crowd_library_of_file`. A joint has the same parent in the clip as in the library.
+/// `tumble_crowd_library_of_file`. A joint must have the same parent in the clip as in the library.
 ///
 /// Joints that the clip does not have stay at rest. The clip must not have joints that the library does not have.
 /// `clip_of_file` is the index of the clip in the file, counted from 0. `interpolation` and `vectors` are as in
@@ -111,8 +111,10 @@ fn authored_vector_method(motion: &Motion, clip: usize) -> Result<VectorMethod, 
 /// 0; it may be null.
 ///
 /// # Errors
-/// `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such clip; `TUMBLE_RESULT_INVALID_INPUT` if its joints or methods do
-/// not fit, or its rotations are relative to the world; otherwise as `tumble_crowd_library_push`.
+/// - `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such clip.
+/// - `TUMBLE_RESULT_INVALID_INPUT` if the joints or methods of the clip do not fit, or its rotations are relative to
+///   the world.
+/// - Otherwise as `tumble_crowd_library_push`.
 ///
 /// # Safety
 /// `interpolation` must be null or point to a `TumbleInterpolation` whose `method` is null or a text that ends with a

@@ -19,7 +19,7 @@ pub struct TumbleCrowdLayer {
     pub layer: usize,
     /// The index of the clip in the library, from 0.
     pub clip: usize,
-    /// The layer's current time in the clip, ticks. Outside the clip `wrap` applies.
+    /// The layer's current time in ticks of the clip. Outside the clip `wrap` applies.
     pub time: i64,
     /// The speed: ticks of the clip for each tick of the clock. 1: as keyed, 0: the layer stands still, negative:
     /// backwards. Its magnitude is below 128; it is rounded to a multiple of 2^-16.

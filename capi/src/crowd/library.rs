@@ -74,15 +74,15 @@ impl TumbleCrowdLibrary {
 /// Creates an empty library for a skeleton of `joint_count` joints.
 ///
 /// `parents` are the indices of the joints' parents, -1 for a root; parents may come after their children. `offsets`
-/// are three numbers `x y z` for each joint: its position in the parent's frame in clips that have no translations
-/// for it. Null: all are 0. `ticks_per_second` is the number of ticks in a second, 0 for 705 600. A clip has up to
-/// 2 147 221 504 ticks, which are 50 minutes by default. The arrays are copied. The caller frees the library with
+/// are three numbers `x y z` for each joint: the position in the parent's frame, for clips without translations of the
+/// joint. Null: all are 0. `ticks_per_second` is the number of ticks in a second, 0 for 705 600. A clip has up to 2 147
+/// 221 504 ticks, which are 50 minutes by default. The arrays are copied. The caller frees the library with
 /// `tumble_crowd_library_free`.
 ///
 /// # Errors
-/// `TUMBLE_RESULT_INVALID_ARGUMENT` if a parent is negative but not -1, or there are too many ticks in a second;
-/// `TUMBLE_RESULT_INVALID_INPUT` if there are no joints, a parent does not exist, the parents form a cycle, or an
-/// offset is not finite.
+/// - `TUMBLE_RESULT_INVALID_ARGUMENT` if a parent is negative but not -1, or there are too many ticks in a second.
+/// - `TUMBLE_RESULT_INVALID_INPUT` if there are no joints, a parent does not exist, the parents form a cycle, or an
+///   offset is not finite.
 ///
 /// # Safety
 /// `parents` must have `joint_count` numbers; `offsets` must be null or have 3 × `joint_count`; and `library` must
@@ -144,10 +144,12 @@ pub(crate) unsafe fn vector_method(
 /// (`tumble_crowd_library_set_reference`). `clip` receives the clip's index, counted from 0; it may be null.
 ///
 /// # Errors
-/// `TUMBLE_RESULT_INVALID_INPUT` if the set has not one track for each joint, a track has the name of no joint, a
-/// track cannot be interpolated as requested, the quantity is not the rotation, a curve rotates so fast that no
-/// polynomial fits it, the clip is too long, or the library is full; `TUMBLE_RESULT_INVALID_ARGUMENT` if a name is
-/// unknown. After any error the library is unchanged.
+/// - `TUMBLE_RESULT_INVALID_INPUT` if the set has not one track for each joint, a track has the name of no joint, a
+///   track cannot be interpolated as requested, the quantity is not the rotation, a curve rotates so fast that no
+///   polynomial fits it, the clip is too long, or the library is full.
+/// - `TUMBLE_RESULT_INVALID_ARGUMENT` if a name is unknown.
+///
+/// After any error the library is unchanged.
 ///
 /// # Safety
 /// `interpolation` must be null or point to a `TumbleInterpolation` whose `method` is null or a text that ends with a
@@ -245,8 +247,8 @@ pub unsafe extern "C" fn tumble_crowd_library_set_inverse_bind(
     })
 }
 
-/// Sets the reference pose of `clip`, from which its additive layers differ: the pose of the clip `from` at a tick.
-/// After the end of `from` it is its last pose.
+/// Sets the reference pose of `clip`, from which its additive layers differ: the pose of the clip `from` at `tick`; for
+/// ticks after the end of `from`, its last pose.
 ///
 /// # Errors
 /// `TUMBLE_RESULT_OUT_OF_RANGE` if one of the two clips does not exist.

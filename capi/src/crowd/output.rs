@@ -84,9 +84,10 @@ pub unsafe extern "C" fn tumble_crowd_output_count(
 /// `tumble_crowd_output_count`.
 ///
 /// # Errors
-/// `TUMBLE_RESULT_WRONG_SIZE` if `output_count` is another number; `TUMBLE_RESULT_WRONG_STATE` if the result of
-/// `tumble_crowd_submit` was not taken, or skinning matrices are requested but the library has no inverse bind
-/// matrices; `TUMBLE_RESULT_DEVICE` if the device fails.
+/// - `TUMBLE_RESULT_WRONG_SIZE` if `output_count` is another number.
+/// - `TUMBLE_RESULT_WRONG_STATE` if the result of `tumble_crowd_submit` was not taken, or skinning matrices are
+///   requested but the library has no inverse bind matrices.
+/// - `TUMBLE_RESULT_DEVICE` if the device fails.
 ///
 /// # Safety
 /// `output` must have `output_count` floats, which nothing else uses during the call.
@@ -137,8 +138,9 @@ pub unsafe extern "C" fn tumble_crowd_evaluate_half(
 /// evaluates or submits again.
 ///
 /// # Errors
-/// `TUMBLE_RESULT_WRONG_STATE` if the result of the previous submission was not taken, or skinning matrices are
-/// requested but the library has no inverse bind matrices; `TUMBLE_RESULT_DEVICE` if the device fails.
+/// - `TUMBLE_RESULT_WRONG_STATE` if the result of the previous submission was not taken, or skinning matrices are
+///   requested but the library has no inverse bind matrices.
+/// - `TUMBLE_RESULT_DEVICE` if the device fails.
 #[unsafe(no_mangle)]
 pub extern "C" fn tumble_crowd_submit(
     crowd: *mut TumbleCrowd,
@@ -155,7 +157,8 @@ pub extern "C" fn tumble_crowd_submit(
 /// Returns whether the submitted evaluation has ended, so that `tumble_crowd_wait` does not wait.
 ///
 /// # Errors
-/// `TUMBLE_RESULT_WRONG_STATE` if nothing was submitted; `TUMBLE_RESULT_DEVICE` if the device fails.
+/// - `TUMBLE_RESULT_WRONG_STATE` if nothing was submitted.
+/// - `TUMBLE_RESULT_DEVICE` if the device fails.
 ///
 /// # Safety
 /// `done` must point to memory for a `bool`.
@@ -203,9 +206,11 @@ unsafe fn wait<T: Number>(
 /// submission.
 ///
 /// # Errors
-/// `TUMBLE_RESULT_WRONG_STATE` if nothing was submitted, or `half` was 1; `TUMBLE_RESULT_WRONG_SIZE` if
-/// `output_count` is another number; after these errors a submitted result can still be taken. `TUMBLE_RESULT_DEVICE`
-/// if the device fails.
+/// - `TUMBLE_RESULT_WRONG_STATE` if nothing was submitted, or `half` was 1.
+/// - `TUMBLE_RESULT_WRONG_SIZE` if `output_count` is another number.
+/// - `TUMBLE_RESULT_DEVICE` if the device fails.
+///
+/// After the first two errors, a submitted result can still be taken.
 ///
 /// # Safety
 /// `output` must have `output_count` floats, which nothing else uses during the call.
@@ -225,9 +230,11 @@ pub unsafe extern "C" fn tumble_crowd_wait(
 /// time of the submission.
 ///
 /// # Errors
-/// `TUMBLE_RESULT_WRONG_STATE` if nothing was submitted, or `half` was 0; `TUMBLE_RESULT_WRONG_SIZE` if
-/// `output_count` is another number; after these errors a submitted result can still be taken. `TUMBLE_RESULT_DEVICE`
-/// if the device fails.
+/// - `TUMBLE_RESULT_WRONG_STATE` if nothing was submitted, or `half` was 0.
+/// - `TUMBLE_RESULT_WRONG_SIZE` if `output_count` is another number.
+/// - `TUMBLE_RESULT_DEVICE` if the device fails.
+///
+/// After the first two errors, a submitted result can still be taken.
 ///
 /// # Safety
 /// `output` must have `output_count` numbers of 16 bits, which nothing else uses during the call.

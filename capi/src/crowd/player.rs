@@ -43,9 +43,9 @@ impl TumbleCrowd {
 /// the crowd with `tumble_crowd_free`.
 ///
 /// # Errors
-/// `TUMBLE_RESULT_WRONG_STATE` if the library has no clips; `TUMBLE_RESULT_INVALID_ARGUMENT` if the number of
-/// instances or layers is out of range; `TUMBLE_RESULT_OUT_OF_MEMORY` or `TUMBLE_RESULT_DEVICE` if there is not
-/// enough memory or the device fails.
+/// - `TUMBLE_RESULT_WRONG_STATE` if the library has no clips.
+/// - `TUMBLE_RESULT_INVALID_ARGUMENT` if the number of instances or layers is out of range.
+/// - `TUMBLE_RESULT_OUT_OF_MEMORY` or `TUMBLE_RESULT_DEVICE` if there is not enough memory or the device fails.
 ///
 /// # Safety
 /// `crowd` must point to memory for a handle.
@@ -79,9 +79,10 @@ pub unsafe extern "C" fn tumble_crowd_new(
 /// 20 bytes each, reach the device with the next evaluation.
 ///
 /// # Errors
-/// `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such instance, layer, clip or mask; `TUMBLE_RESULT_INVALID_ARGUMENT`
-/// if another member is invalid. The message has the index of the first change that is refused. After any error
-/// nothing changes.
+/// - `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such instance, layer, clip or mask.
+/// - `TUMBLE_RESULT_INVALID_ARGUMENT` if another member is invalid.
+///
+/// The message has the index of the first change that is refused. After any error nothing changes.
 ///
 /// # Safety
 /// `layers` must have `count` structures.
@@ -175,7 +176,7 @@ pub extern "C" fn tumble_crowd_advance(crowd: *mut TumbleCrowd, seconds: f64) ->
     code(|| Ok(handle::get(crowd)?.lock()?.inner.advance(seconds)?))
 }
 
-/// Sets the clock's time, ticks, forwards or backwards. All instances follow.
+/// Sets the clock's time in ticks, forwards or backwards. All instances follow.
 ///
 /// # Errors
 /// `TUMBLE_RESULT_INVALID_ARGUMENT` if `ticks` is 2^52 or more.
@@ -184,7 +185,7 @@ pub extern "C" fn tumble_crowd_set_clock(crowd: *mut TumbleCrowd, ticks: u64) ->
     code(|| Ok(handle::get(crowd)?.lock()?.inner.set_clock(ticks)?))
 }
 
-/// Returns the clock's time, ticks.
+/// Returns the clock's time in ticks.
 ///
 /// # Safety
 /// `ticks` must point to memory for a number.

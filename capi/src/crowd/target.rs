@@ -24,20 +24,21 @@ impl Object for TumbleCrowdTarget {
 /// Prepares the recording of evaluations of a crowd, whose results go to a range of the application's Vulkan buffer.
 ///
 /// Kernels are compiled and memory is allocated here, not when a frame is recorded. The crowd's engine must have been
-/// created by `tumble_engine_from_vulkan`; this call submits to its queue when it checks a new kernel. `values` is a
-/// `TumbleCrowdValues`. `half` is 0 for numbers of 32 bits, 1 for 16 bits. `buffer` is the `VkBuffer`, as a number:
-/// `(uint64_t)buffer`. The range starts at `offset`, a multiple of 256, and has `size` bytes: at least
-/// `tumble_crowd_output_count` × 4, or × 2 with `half` 1, and room for one instance. If it has room for more
-/// instances than are visible now, more may be visible later.
+/// created by `tumble_engine_from_vulkan`. This call checks kernels that were not checked before, and then submits to
+/// the engine's queue. `values` is a `TumbleCrowdValues`. `half` is 0 for numbers of 32 bits, 1 for 16 bits. `buffer`
+/// is the `VkBuffer`, as a number: `(uint64_t)buffer`. The range starts at `offset`, a multiple of 256, and has `size`
+/// bytes: at least `tumble_crowd_output_count` × 4, or × 2 with `half` 1, and room for one instance. If it has room for
+/// more instances than are visible now, more may be visible later.
 ///
 /// The buffer must belong to the engine's device, be bound to memory, and have the usage
 /// `VK_BUFFER_USAGE_STORAGE_BUFFER_BIT`. The application frees the target with `tumble_crowd_target_free` before it
 /// destroys the buffer or the device.
 ///
 /// # Errors
-/// `TUMBLE_RESULT_INVALID_ARGUMENT` if the engine was not created by `tumble_engine_from_vulkan`;
-/// `TUMBLE_RESULT_WRONG_SIZE` if the range is not aligned or too short; `TUMBLE_RESULT_WRONG_STATE` if skinning
-/// matrices are requested but the library has no inverse bind matrices; `TUMBLE_RESULT_DEVICE` if the device fails.
+/// - `TUMBLE_RESULT_INVALID_ARGUMENT` if the engine was not created by `tumble_engine_from_vulkan`.
+/// - `TUMBLE_RESULT_WRONG_SIZE` if the range is not aligned or too short.
+/// - `TUMBLE_RESULT_WRONG_STATE` if skinning matrices are requested but the library has no inverse bind matrices.
+/// - `TUMBLE_RESULT_DEVICE` if the device fails.
 ///
 /// # Safety
 /// The buffer must be as described, and `target` must point to memory for a handle.
@@ -79,8 +80,10 @@ pub unsafe extern "C" fn tumble_crowd_target_new(
 /// at the same time without a lock.
 ///
 /// # Errors
-/// `TUMBLE_RESULT_INVALID_ARGUMENT` if the target belongs to another crowd; `TUMBLE_RESULT_WRONG_SIZE` if more
-/// instances are visible than it has room for. After any error nothing is recorded.
+/// - `TUMBLE_RESULT_INVALID_ARGUMENT` if the target belongs to another crowd.
+/// - `TUMBLE_RESULT_WRONG_SIZE` if more instances are visible than the target has room for.
+///
+/// After any error nothing is recorded.
 ///
 /// # Safety
 /// The command buffer must be as described, nothing else may use it during the call, and its commands must be

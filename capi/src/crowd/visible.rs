@@ -12,8 +12,10 @@ use crate::result::{TumbleResult, code};
 /// may be in it twice. It is copied.
 ///
 /// # Errors
-/// `TUMBLE_RESULT_OUT_OF_RANGE` if an instance does not exist; `TUMBLE_RESULT_INVALID_ARGUMENT` if it is in the list
-/// twice. After any error nothing changes.
+/// - `TUMBLE_RESULT_OUT_OF_RANGE` if an instance does not exist.
+/// - `TUMBLE_RESULT_INVALID_ARGUMENT` if an instance is in the list twice.
+///
+/// After any error nothing changes.
 ///
 /// # Safety
 /// `instances` must have `count` numbers.

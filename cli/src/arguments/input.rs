@@ -354,7 +354,7 @@ impl UnreadFiles {
         self.endings.insert(ending.into_owned());
     }
 
-    /// `5 files with other endings are not read (.bak, .txt, none); name them to read them`.
+    /// `5 files are not read because of their endings (.bak, .txt, none); to read them, name them on the command line`.
     fn note(&self) {
         if self.count == 0 {
             return;
@@ -368,9 +368,12 @@ impl UnreadFiles {
         if self.endings.len() > listed.len() {
             listed.push("…".to_owned());
         }
-        let are = if self.count == 1 { "is" } else { "are" };
+        let (are, their, them) = match self.count {
+            1 => ("is", "its ending", "it"),
+            _ => ("are", "their endings", "them"),
+        };
         words::note(&format!(
-            "{} with other endings {are} not read ({}); a file that is named is read by its content",
+            "{} {are} not read because of {their} ({}); to read {them}, name {them} on the command line",
             words::count(self.count, "file"),
             listed.join(", ")
         ));

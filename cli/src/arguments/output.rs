@@ -227,7 +227,9 @@ impl OutputArguments {
         };
         if parents.len() != tracks {
             let count = parents.len();
-            return Err(format!("--parents has {count} entries for {tracks} tracks"));
+            return Err(format!(
+                "--parents has {count} where {tracks} are expected, one for each track"
+            ));
         }
         let indices = parents.iter().map(|&parent| match parent {
             -1 => Ok(None),

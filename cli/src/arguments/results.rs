@@ -35,7 +35,7 @@ pub(crate) struct ResultArguments {
     /// the same options
     #[arg(long)]
     resume: bool,
-    /// List the results that would be written, skipped (--resume) and removed (--prune), and change nothing
+    /// List the results that would be written, kept (--resume) and removed (--prune), and change nothing
     #[arg(short = 'n', long)]
     dry_run: bool,
     /// In a directory of results: remove those whose inputs do not exist any more, and their lines in the manifest
@@ -165,7 +165,7 @@ impl ResultArguments {
         self.format
     }
 
-    /// Whether results that are done are skipped.
+    /// Whether results that are done are kept.
     pub(crate) fn is_resumed(&self) -> bool {
         self.resume
     }

@@ -420,7 +420,7 @@ pub(crate) struct BatchStart<'a> {
     pub(crate) skipped: Vec<InputEntry>,
     /// As in [`ManifestEntry`].
     pub(crate) options: &'a str,
-    /// Whether results that are done are skipped.
+    /// Whether results that are done are kept.
     pub(crate) resume: bool,
 }
 

@@ -546,8 +546,8 @@ impl ResultRecorder for Manifest {
         let output = entry.output.clone();
         self.add(entry)?;
         written.commit().inspect_err(|_| {
-            // The line stays in the file until the end of the batch: the result does not match it, so it
-            // is made again.
+            // The line stays in the manifest until the end of the batch. The result does not match the line, so
+            // `--resume` makes the result again.
             self.added.remove(&output);
         })
     }

@@ -62,7 +62,7 @@ pub(crate) struct PipelineInputs {
 pub(crate) struct BatchOptions {
     /// Everything that determines a result besides its input.
     pub(crate) options: ResultOptions,
-    /// Results that are done are skipped.
+    /// Results that are done are kept.
     pub(crate) resume: bool,
     /// Results of other inputs are replaced.
     pub(crate) overwrite: bool,
@@ -796,7 +796,7 @@ impl BatchRecords<'_> {
             if self.skipped_results != self.skipped {
                 skipped += &format!(" of {}", words::count(self.skipped, "input"));
             }
-            parts.push(format!("{skipped} skipped (already complete)"));
+            parts.push(format!("{skipped} kept (already complete)"));
         }
         if self.failed > 0 {
             parts.push(format!("{} failed", words::count(self.failed, "input")));

@@ -68,7 +68,7 @@ pub(crate) struct PreviewedResult {
 enum PreviewState {
     /// It would be written.
     Planned,
-    /// It is complete, and would be skipped.
+    /// It is complete, and would be kept.
     Kept,
     /// It would be removed.
     Pruned,
@@ -92,7 +92,7 @@ impl fmt::Display for PreviewedResult {
 }
 
 impl Preview {
-    /// How many results would be made, skipped and removed.
+    /// How many results would be made, kept and removed.
     pub(crate) fn summary(&self) -> String {
         let count = |state| {
             let of_state = self.results.iter().filter(|result| result.state == state);
@@ -106,7 +106,7 @@ impl Preview {
             count => summary += &format!(" ({count} of inputs that failed in the last run)"),
         }
         for (state, done) in [
-            (PreviewState::Kept, "skipped (already complete)"),
+            (PreviewState::Kept, "kept (already complete)"),
             (PreviewState::Pruned, "removed"),
         ] {
             match count(state) {
@@ -307,7 +307,7 @@ impl<'a> PreviewedFolder<'a> {
                     output: self.out.join(&entry.output).display().to_string(),
                     exists: true,
                     failed_before: false,
-                    reason: Some("complete, would be skipped".into()),
+                    reason: Some("complete, would be kept".into()),
                 }));
             self.planned.complete(name);
             return Ok(());

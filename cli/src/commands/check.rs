@@ -120,7 +120,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         })?,
     };
     let mut lines = ManifestLines::parse(&bytes);
-    // An incomplete last line: a batch was killed while it wrote it, or the file was truncated.
+    // An incomplete last line: a batch was killed while writing the line, or the file was truncated.
     lines.damaged += usize::from(bytes.last().is_some_and(|&last| last != b'\n'));
     if shards.is_some() {
         lines.extend(record::lines(folder));

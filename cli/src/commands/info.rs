@@ -410,7 +410,7 @@ impl Summary {
                 _ => format!("-{name}"),
             });
             let axis: String = axis.collect();
-            line("space", format!("{metres} m a unit, {axis} is up"));
+            line("space", format!("{metres} m per unit, {axis} is up"));
         }
         if let Some(length) = self.box_length {
             line("box length", length.to_string());

@@ -20,7 +20,7 @@ pub(crate) struct Arguments {
 
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let mut program = crate::Arguments::command();
-    // Help, names and options of every command reach the subcommands when the program is built.
+    // `build` passes the help, names and global options on to the subcommands, which clap does only then.
     program.build();
     let command = match &arguments.command {
         None => program,

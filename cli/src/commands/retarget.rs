@@ -188,9 +188,9 @@ struct ClipReport {
     resting: Vec<String>,
     /// Joints of the input that nothing follows.
     dropped: Vec<String>,
-    /// The dropped joint that rotates furthest from its rest pose, and this angle, degrees.
+    /// The dropped joint that rotates furthest from its rest pose, and this angle in degrees.
     furthest_dropped: Option<(String, f64)>,
-    /// The angle by which the rest pose of each joint was aligned, degrees.
+    /// The angle in degrees by which the rest pose of each joint was aligned.
     aligned: serde_json::Map<String, serde_json::Value>,
     scale: f64,
     /// x y z w.

@@ -262,7 +262,7 @@ fn outputs_that_a_manifest_names_elsewhere_are_not_read() {
         make();
         let resumed = run(folder, &with(&BATCH, &["--resume"]));
         assert!(
-            !resumed.words.contains("2 results skipped"),
+            !resumed.words.contains("2 results kept"),
             "{kind}: {}",
             resumed.words
         );
@@ -556,7 +556,7 @@ fn results_are_no_inputs_of_the_next_run() {
         let whole = tree(&folder.join("walks"));
         let resumed = succeed(folder, &with(&line, &["--resume"]));
         assert!(
-            resumed.words.contains("2 results skipped"),
+            resumed.words.contains("2 results kept"),
             "{out}: {}",
             resumed.words
         );

@@ -58,7 +58,7 @@ fn no_name_ends_a_batch() {
         let resumed = run(folder, &[&line[..], &["--resume"]].concat());
         assert_eq!(resumed.code, 3, "{}", resumed.words);
         assert!(
-            resumed.words.contains("7 results skipped"),
+            resumed.words.contains("7 results kept"),
             "{}",
             resumed.words
         );
@@ -115,7 +115,7 @@ fn animations_of_any_name_get_files() {
         );
         let resumed = succeed(folder, &["eval", "m.gltf", "a.dat", "-o", &out, "--resume"]);
         assert!(
-            resumed.words.contains("3 results of 2 inputs skipped"),
+            resumed.words.contains("3 results of 2 inputs kept"),
             "{}",
             resumed.words
         );
@@ -181,7 +181,7 @@ fn results_never_share_a_name() {
     assert!(made.iter().eq(expected), "{made:?}");
     let resumed = succeed(folder, &[&full[..], &["out", "--resume"]].concat());
     assert!(
-        resumed.words.contains("3 results skipped"),
+        resumed.words.contains("3 results kept"),
         "{}",
         resumed.words
     );

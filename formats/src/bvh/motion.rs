@@ -7,7 +7,7 @@ use glam::{DQuat, DVec3, Quat, Vec3};
 use tumble::{FrameRate, TrackSet};
 
 use crate::bvh::hierarchy::{FIRST_WORD, Hierarchy};
-use crate::diagnostic::{Code, Diagnostic};
+use crate::diagnostic::{Code, Diagnostic, counted};
 use crate::format::ReadOptions;
 use crate::motion::origin::{SMALL, origin_at_rest, relative};
 use crate::motion::{ChannelInterpolation, Channels, Joint, Motion, Transform};
@@ -364,6 +364,7 @@ fn wrong_count<R: BufRead>(lines: &Lines<R>, line: &str, columns: usize) -> Diag
     let found = tokens(line).count();
     let first_extra = tokens(line).nth(columns).map(|(column, _)| column);
     let column = first_extra.unwrap_or(line.trim_end().len() as u64 + 1);
-    let message = format!("{found} numbers where {columns} are expected, one for each channel");
+    let numbers = counted(found, "number", "numbers");
+    let message = format!("{numbers} where {columns} are expected, one for each channel");
     lines.refuse(column, Code::BvhRow, message)
 }

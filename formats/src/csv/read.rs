@@ -189,7 +189,7 @@ fn check_encoding(name: &str, bytes: &[u8], warnings: &mut Warnings) -> Result<u
     if bytes.starts_with(b"\xef\xbb\xbf") {
         warnings.warn(Code::ByteOrderMark, || {
             let location = Location::Text { line: 1, column: 1 };
-            (Some(location), "a byte-order mark; it is skipped")
+            (Some(location), "a byte-order mark; it is ignored")
         });
         return Ok(3);
     }
@@ -245,7 +245,7 @@ impl<'a> Sheet<'a> {
             return Ok(());
         }
         let location = self.cell(record, width.min(found));
-        // `0,5,1,25` is a decimal comma: the parts of a number are in separate cells.
+        // In `0,5,1,25` the commas may be decimal (0.5 and 1.25): then the two parts of a number are in separate cells.
         let is_digits = |cell: &[u8]| cell.iter().all(|it| it.is_ascii_digit() || *it == b'-');
         let hint = match found > width && record.iter().all(is_digits) {
             true => "; if numbers have decimal commas, write them with points",

@@ -63,7 +63,7 @@ pub(super) static DIALECT: Dialect = Dialect {
             None => {
                 warnings.warn(Code::UnnamedJoints, || {
                     let message = format!(
-                        "the file does not name its {count} joints; they are called joint_0, joint_1 …, and are in the world"
+                        "the file does not name its joints ({count}); they are called joint_0, joint_1 …, and are in the world"
                     );
                     (None, message)
                 });

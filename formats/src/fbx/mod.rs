@@ -218,7 +218,7 @@ fn load(name: &str, bytes: &[u8], budget: &Budget) -> Result<SceneRoot, Diagnost
             ),
             ErrorType::UnsupportedVersion => (
                 Code::FbxVersion,
-                "the version of the file is not known; export it as FBX 2014 (7.4) or later"
+                "the version of the file is not known; export it as FBX 7.4 to 7.7 (FBX 2014 to 2020)"
                     .to_owned(),
             ),
             _ => {

@@ -177,12 +177,12 @@ fn no_room(
             each.find_map(|clip| loss(feature, clip, options))
         })
         .collect();
-    let (last, others) = left_out.split_last()?;
-    let all = match others {
-        [] => (*last).to_owned(),
-        others => format!("{} and {last}", others.join(", ")),
-    };
+    if left_out.is_empty() {
+        return None;
+    }
     let name = format.name.to_uppercase();
+    // Semicolons, because some entries contain commas and "and".
+    let all = left_out.join("; ");
     let message = format!("{name} cannot store this, left out: {all}");
     Some(Diagnostic::new(&options.name, Code::NoRoom, message))
 }

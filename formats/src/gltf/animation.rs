@@ -364,7 +364,7 @@ fn rest(
     if rest.is_sheared {
         let pointer = format!("/nodes/{node}/matrix");
         let message = format!(
-            "the matrix of `{}` shears or projects; world poses cannot be computed",
+            "the matrix of `{}` shears or projects; it is approximated by translation, rotation and scale, and world poses cannot be computed",
             nodes.name(node)
         );
         reader.warn(Code::Shear, &pointer, || message.clone());

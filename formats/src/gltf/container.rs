@@ -55,7 +55,7 @@ impl Container {
         if let Some(rest) = json.strip_prefix(BYTE_ORDER_MARK) {
             json = rest;
             warnings.warn(Code::ByteOrderMark, || {
-                (None, "a byte-order mark before the JSON; it is skipped")
+                (None, "a byte-order mark before the JSON; it is ignored")
             });
         }
         let is_other = !is_glb && !json.trim_ascii_start().starts_with(b"{");

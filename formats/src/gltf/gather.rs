@@ -55,8 +55,8 @@ pub(super) fn buffers<'a>(
     }
     let members = match members {
         Some(members) => members,
-        // In a GLB, the first buffer without a URI is the BIN chunk. Here this would be a buffer of the input that
-        // has no URI, so a BIN chunk of 4 bytes is written before it.
+        // In a GLB, a first buffer without a URI is the BIN chunk. The first buffer of the input has no URI and no
+        // bytes, and readers would take it for the BIN chunk; therefore a BIN chunk of 4 bytes is written before it.
         None if is_first_unnamed => {
             bytes.extend([0; 4]);
             String::new()

@@ -31,9 +31,10 @@ impl<'de, T: TryFrom<u64>> Deserialize<'de> for Whole<T> {
                 if number.fract() == 0.0 && (0.0..=limit).contains(&number) {
                     return self.visit_u64(number as u64);
                 }
-                Err(E::custom(format!(
-                    "{number} is not a whole number from 0 on"
-                )))
+                Err(E::custom(match number > limit {
+                    true => format!("{number} is too large"),
+                    false => format!("{number} is not a whole number from 0 on"),
+                }))
             }
         }
 

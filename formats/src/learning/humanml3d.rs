@@ -1,4 +1,4 @@
-//! HumanML3D: 263 numbers a frame of 22 joints of SMPL, y up, at 20 frames a second, and back.
+//! HumanML3D: 263 numbers per frame of 22 joints of SMPL, y up, at 20 frames a second, and back.
 
 use glam::{DQuat, DVec3};
 

@@ -28,7 +28,7 @@ names! {
 }
 
 impl HeadingSource {
-    /// The heading of a rotation, rad.
+    /// The heading of a rotation in rad.
     #[must_use]
     pub fn heading(self, rotation: DQuat, ground: Ground) -> f64 {
         match self {
@@ -47,7 +47,7 @@ pub struct RootMotion {
     pub ground: Ground,
     /// Places at height 0.
     pub positions: Vec<DVec3>,
-    /// Headings, rad. They change by half a turn at most from frame to frame, so they also count whole turns.
+    /// Headings in rad. They change by half a turn at most from frame to frame, so they also count whole turns.
     pub headings: Vec<f64>,
 }
 

@@ -24,7 +24,7 @@ pub enum FeatureSet {
     SixRows,
     /// `six_interleaved`.
     SixInterleaved,
-    /// `heading` (frames) of the first joint, rad: its twist about the axis that points up.
+    /// `heading` (frames) of the first joint in rad: its twist about the axis that points up.
     Heading,
     /// `contacts` (frames, joints), 0 or 1.
     Contacts,
@@ -51,7 +51,7 @@ names! {
 pub struct WorldFrames {
     /// The name of each joint.
     pub names: Vec<String>,
-    /// The time of each frame, seconds.
+    /// The time of each frame in seconds.
     pub times: Vec<f64>,
     /// Metres.
     pub positions: Vec<DVec3>,

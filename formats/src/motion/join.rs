@@ -70,8 +70,10 @@ pub enum JoinError {
 /// places where clips meet.
 ///
 /// # Errors
-/// When there is no clip, the clips differ in their joints, offsets, units or interpolation, the gap is not known, the
-/// poses of a gap of 0 are different, or a new key would need tangents, velocities or tensions.
+/// * When there is no clip.
+/// * When the clips differ in their joints, offsets, units or interpolation.
+/// * When the gap is not known, or is 0 and the two poses differ.
+/// * When a new key would need tangents, velocities or tensions.
 pub fn join(clips: &[&Motion], gap: Option<f64>) -> Result<Motion, JoinError> {
     let first = *clips.first().ok_or(JoinError::Nothing)?;
     let rate_of = |clip: &Motion| clip.rate.or_else(|| clip.rate_of_keys());
@@ -180,7 +182,7 @@ struct ClipPart<'a> {
     clip: &'a Motion,
     /// Its first and its last key in its times.
     span: (f64, f64),
-    /// Its start in the joined clip, seconds.
+    /// Its start in the joined clip in seconds.
     start: f64,
     /// The rate of all keys.
     rate: Option<FrameRate>,

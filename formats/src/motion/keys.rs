@@ -114,7 +114,7 @@ impl Origin<'_> {
                 return Err(self.refuse(key, Code::TimeNotIncreasing, message));
             } else if equal(before, key) {
                 warnings.warn(Code::EqualKeys, || {
-                    let message = format!("two equal keys at time {time}; one is dropped");
+                    let message = format!("two equal keys at time {time}; one is left out");
                     (Some((self.location)(key)), message)
                 });
             } else {
@@ -293,7 +293,8 @@ mod tests {
         assert_eq!(kept(Duplicates::First).unwrap(), Some(vec![0, 1, 4]));
         assert_eq!(kept(Duplicates::Last).unwrap(), Some(vec![0, 3, 4]));
         assert_eq!(kept(Duplicates::Refuse).unwrap_err().code, Code::EqualTimes);
-        // A jump keeps both, the earlier one a step before; so does one at the start, and a short one.
+        // `Both` keeps both keys of a jump and moves the earlier one back by a step of f32; also where the key before
+        // is only 1e-12 s earlier.
         let mut times = [0.0, 1.0, 1.0, 1.0, 2.0];
         let jump = kept_of(&mut times, Duplicates::Both).unwrap();
         assert_eq!(jump, Some(vec![0, 1, 3, 4]));

@@ -28,8 +28,8 @@ pub enum RetimeError {
     Track(#[from] TrackError),
 }
 
-/// The clip `speed` times as fast, with its first key at `start` (by default where it is). Keys do not change; velocities
-/// and tangents, which are rates, are multiplied by the speed.
+/// Returns the clip, played `speed` times as fast. The first key is moved to `start`, in seconds; without `start`, it
+/// stays at its time. Keys do not change; velocities and tangents, which are rates, are multiplied by the speed.
 ///
 /// # Errors
 /// When the speed is not greater than 0, a number is not finite, or times become too large or equal.

@@ -24,7 +24,7 @@ use crate::warnings::Warnings;
 pub(super) struct NpzDocument {
     archive: Archive,
     plan: ArchivePlan,
-    /// First and last time of the clip, seconds.
+    /// First and last time of the clip in seconds.
     span: Option<(f64, f64)>,
 }
 

@@ -11,7 +11,7 @@ use glam::DVec3;
 use tumble::{FrameRate, Layout};
 
 use crate::array::shape_text;
-use crate::diagnostic::{Code, Diagnostic};
+use crate::diagnostic::{Code, Diagnostic, counted};
 use crate::motion::WrittenJoint;
 use crate::motion::{Channels, Transform, circle};
 use crate::npz::archive::Archive;
@@ -306,8 +306,11 @@ impl ArchivePlan {
         if frames != self.frames || !is_rotation && end > self.tracks {
             let name = &archive.members[self.parts[0].member].name;
             let message = format!(
-                "the array has {frames} frames of {} tracks; `{name}` has {} of {}",
-                end, self.frames, self.tracks
+                "the array has {} of {}; `{name}` has {} of {}",
+                counted(frames, "frame", "frames"),
+                counted(end, "track", "tracks"),
+                self.frames,
+                self.tracks
             );
             return Err(archive.refuse(part.member, Code::Shape, message));
         }
@@ -392,7 +395,9 @@ impl ArchivePlan {
         if count == self.tracks {
             return Ok(());
         }
-        let message = format!("the array has {count} entries for {} tracks", self.tracks);
+        let entries = counted(count, "entry", "entries");
+        let tracks = counted(self.tracks, "track", "tracks");
+        let message = format!("the array has {entries} for {tracks}");
         Err(archive.refuse(member, Code::Shape, message))
     }
 }

@@ -200,7 +200,7 @@ pub(crate) fn plan(
             is_smpl |= name == "body_pose" && found == SMPL_BODY;
             if found != joints && !(name == "body_pose" && is_smpl) {
                 let message = format!(
-                    "the array has {} numbers a frame where {} are rotation vectors; components of \
+                    "the array has {} numbers per frame where {} are rotation vectors; components of \
                      a hand model cannot be read",
                     3 * found,
                     3 * joints

@@ -94,7 +94,7 @@ names! {
 /// The motion of a robot's joints and bodies.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Bodies {
-    /// The value of each joint of [`Tree::scalar_joints`] at each sample, `[sample][joint]`: rad, metres.
+    /// The value of each joint of [`Tree::scalar_joints`] at each sample, `[sample][joint]`, in rad or metres.
     pub joint_values: Vec<f32>,
     /// The velocities of the same, per second.
     pub joint_rates: Vec<f32>,

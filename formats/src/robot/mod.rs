@@ -61,7 +61,7 @@ names! {
 /// Extensions of files with robots.
 pub const EXTENSIONS: [&str; 3] = ["xml", "mjcf", "urdf"];
 
-/// The largest length of a robot's files together, bytes.
+/// The largest length of a robot's files together in bytes.
 const MAX_BYTES: u64 = 4 << 20;
 
 /// The largest number of bodies.

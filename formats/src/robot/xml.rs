@@ -406,7 +406,7 @@ impl<'a> Documents<'a> {
     }
 }
 
-/// The rotation about a unit axis by an angle, rad.
+/// The rotation about a unit axis by an angle in rad.
 pub(super) fn about(axis: DVec3, angle: f64) -> DQuat {
     let (sine, cosine) = libm::sincos(angle * 0.5);
     let [x, y, z] = (axis * sine).to_array();

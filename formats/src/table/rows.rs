@@ -61,7 +61,7 @@ pub(crate) enum TimeColumn {
 impl TimeColumn {
     /// For clips that count from these whole seconds.
     pub(crate) fn of(offsets: impl IntoIterator<Item = i64>) -> Self {
-        /// 285 years, seconds: an i64 of nanoseconds overflows after 292 years.
+        /// 285 years in seconds: an i64 of nanoseconds overflows after 292 years.
         const MAX_OFFSET: u64 = 9_000_000_000;
         let mut counts = false;
         for offset in offsets {

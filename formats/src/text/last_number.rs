@@ -67,7 +67,7 @@ fn last_number(line: &[u8]) -> Option<(usize, usize)> {
     let is_between = |byte: &u8| matches!(byte, b' ' | b'\t' | b',' | b';');
     let start = line.iter().rposition(is_between).map_or(0, |at| at + 1);
     let number = &line[start..];
-    // Not parsed, because each line passes here: readers refuse what is no number.
+    // Numbers are not parsed here, because this runs for every line; the readers refuse text that is not a number.
     let is_part = |byte: &u8| byte.is_ascii_digit() || b"+-.eE".contains(byte);
     let is_number =
         !is_comment && number.iter().all(is_part) && number.iter().any(u8::is_ascii_digit);

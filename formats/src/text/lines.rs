@@ -45,7 +45,7 @@ impl<R: BufRead> Lines<R> {
         }
         if start.starts_with(MARK) {
             lines.number = 1;
-            lines.warn(1, Code::ByteOrderMark, "a byte-order mark; it is skipped");
+            lines.warn(1, Code::ByteOrderMark, "a byte-order mark; it is ignored");
             lines.number = 0;
         }
         Ok(lines)
@@ -199,12 +199,24 @@ impl<R: BufRead> Lines<R> {
 
     /// Counts a warning; the first of each code determines the location and the message.
     pub(crate) fn warn(&mut self, column: u64, code: Code, message: impl Into<String>) {
-        match self.warnings.iter_mut().find(|w| w.code == code) {
+        let warning = self.refuse(column, code, message.into());
+        self.count_warning(warning);
+    }
+
+    /// As [`Lines::warn`], about an earlier line as a whole.
+    pub(crate) fn warn_line(&mut self, line: u64, code: Code, message: impl Into<String>) {
+        let warning = Diagnostic {
+            location: Some(Location::Text { line, column: 1 }),
+            ..self.refuse(1, code, message.into())
+        };
+        self.count_warning(warning);
+    }
+
+    fn count_warning(&mut self, warning: Diagnostic) {
+        let mut known = self.warnings.iter_mut();
+        match known.find(|known| known.code == warning.code) {
             Some(known) => known.count += 1,
-            None => {
-                let warning = self.refuse(column, code, message.into());
-                self.warnings.push(warning);
-            }
+            None => self.warnings.push(warning),
         }
     }
 

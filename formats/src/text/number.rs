@@ -140,7 +140,7 @@ fn refuse(token: &str) -> Refusal {
     let bare = lower.trim_start_matches(['+', '-']);
     let words = ["nan", "inf", "infinity", "ind", "qnan", "snan"];
     if words.contains(&bare) || bare.contains('#') || bare.starts_with("nan(") {
-        let message = format!("`{token}` is not finite; remove or repair this key");
+        let message = format!("`{token}` is not finite; write a finite number");
         return (Code::NotFinite, message);
     }
     let hint = if bare.starts_with("0x") {

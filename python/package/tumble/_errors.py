@@ -90,7 +90,7 @@ class OutputError(Error, OSError):
 
 
 class InputWarning(_Located, UserWarning):
-    """A file was read, but something in it is probably a mistake.
+    """Something in a file is probably a mistake, is not read, or cannot be stored in the format that is written.
 
     >>> import tumble
     >>> issubclass(tumble.InputWarning, UserWarning)

@@ -389,7 +389,7 @@ class MotionLibrary(Generic[_A]):
         **options: Any,
     ) -> MotionLibrary[Any]:
         """Reads motion files: a path, a pattern such as "amass/**/*.npz", or a list of them, on all threads. Every clip
-        of every file belongs to the library, in the order of the names.
+        of every file belongs to the library, in the order of the file names.
 
         `fps`: clips are sampled at this rate by `method`; an incomplete frame at the end is left out. `tracks`: the names
         or the indices of joints, in the order of the results; their parents must be included, too. The keys of other joints
@@ -398,9 +398,10 @@ class MotionLibrary(Generic[_A]):
         all is read, too, unless `skeleton` has it.
 
         `options`: the keywords of `tumble.load`, for each file, such as `source_fps`, `up`, `scale`, `offsets`,
-        `body_model` and `map`. With `tracks`, `offsets` are those of the selected joints, in the order of `tracks`, or of
-        all joints of the file, in its order, as the number of rows says; or a dict by names. `on_error`: "refuse" ends at the first file that cannot be read; "skip" leaves out such
-        files, and clips that do not fit the skeleton, and lists them in `skipped`. Files of AMASS without a motion
+        `body_model` and `map`. With `tracks`, `offsets` has a row for each selected joint, in the order of `tracks`, or a
+        row for each joint of the file, in the order of the file; the number of rows tells which. Or `offsets` is a dict by
+        names. `on_error`: "refuse" ends at the first file that cannot be read; "skip" leaves out such files, and clips
+        that do not fit the skeleton, and lists them in `skipped`. Files of AMASS without a motion
         (`shape.npz`, `*_stagei.npz`) are left out, too. `progress`: a bar such as `tqdm.tqdm` or an instance of it, or a
         function, which is called with the number of files read so far and of all. `packed`, `device`: as of the class.
 
@@ -668,13 +669,14 @@ class MotionLibrary(Generic[_A]):
         """The states of instances: `clip_ids` has the clip of each instance, and `times` its time, in seconds after the clip's
         first key. (`Clip` and `Engine` use the times of the keys.) Both have the shape of the result, (N,) for example, or
         shapes that broadcast to it, such as (N, 1) and (N, 10), or a number and (N,). Before the first key of a clip, and after
-        its last one, the pose is that of this key, and the velocities are those at it, not 0.
+        its last one, the pose is that of this key, and the velocities are those at this key, not 0. (`Engine.velocity` and
+        scalars of an `Engine` give 0 there.)
 
         `arrays`: the names of those to compute, by default all; fewer arrays take less time. `out`: a state; the arrays
         that it has are filled again. `finite`: velocities as differences of the two frames of the clip's rate around a
         time, as other motion libraries have them, instead of the exact derivatives. `order`: of quaternions. `rotations`:
         how both arrays of rotations are stored: "quaternion" (…, 4), "matrix" (…, 3, 3) for column vectors, "6d" (…, 6),
-        the matrix's first two columns, or "rotvec" (…, 3), axis times angle.
+        the first two columns of the matrix (`six-columns` of docs/features.md), or "rotvec" (…, 3), axis times angle.
 
         A library on a device returns new `DeviceArray`s: `out`, `order` and `rotations` are for the CPU alone. `clip_ids`
         and `times` are read by the host; arrays of a device are copied to it first.
@@ -1016,8 +1018,8 @@ class MotionLibrary(Generic[_A]):
 
     @property
     def nbytes(self) -> int:
-        """The bytes of the prepared clips: with slerp 16 a key of a joint and 16 to 48 a key of the root's position, or
-        8 a key of a joint if `packed`; 192 a key with smooth methods. A library on a device has as many there, and keeps
+        """The bytes of the prepared clips: with slerp 16 per key of a joint (8 if `packed`), with smooth methods 192; and for
+        the root 16 to 48 per key of its position and time. A library on a device has as many there, and keeps
         those of the host for `save` and for copies.
 
         >>> import numpy as np, tumble

@@ -9,6 +9,7 @@ from typing_extensions import Buffer
 
 from tumble._notebook import View
 
+# The names for users are those in `tumble/__init__.py`. The others are used by the package's modules and tests.
 __all__ = [
     "ArrayDifference",
     "ChannelDifference",
@@ -163,6 +164,7 @@ _Up: TypeAlias = tuple[float, float, float] | Sequence[float] | NDArray[Any]
 
 @final
 class Clip:
+    """Tracks of rotation keys, with names, a skeleton, translations and scales where there are any."""
     def __new__(
         cls,
         times: _Arrays,
@@ -186,42 +188,68 @@ class Clip:
     def __copy__(self) -> Clip: ...
     def __deepcopy__(self, _memo: Any, /) -> Clip: ...
     @property
-    def name(self) -> str | None: ...
+    def name(self) -> str | None:
+        """The clip's name, or None."""
     @property
-    def names(self) -> list[str]: ...
+    def names(self) -> list[str]:
+        """The tracks' names; `box1`, `box2` … where there are none."""
     @property
-    def parents(self) -> list[int | None] | None: ...
+    def parents(self) -> list[int | None] | None:
+        """The index of the parent of each track, None for roots; None without a skeleton."""
     @property
-    def offsets(self) -> _Places | None: ...
+    def offsets(self) -> _Places | None:
+        """Where each track rests in its parent's frame, (tracks, 3); None without a skeleton."""
     @property
-    def origins(self) -> NDArray[np.float64] | None: ...
+    def origins(self) -> NDArray[np.float64] | None:
+        """The origin that was subtracted from the translations of each track, (tracks, 3), float64, so that f32
+        is enough for the rest of positions such as those of maps; None where none was. Positions that the
+        package returns or writes have it added again, in float64."""
     @property
-    def scalars(self) -> dict[str, tuple[NDArray[np.float64], _Places]]: ...
+    def scalars(self) -> dict[str, tuple[NDArray[np.float64], _Places]]:
+        """The scalars, such as the angles of a robot's joints, by their names: the times of their keys in seconds (keys,),
+        and their values (keys,), float32 (float64 where whole turns were taken off an angle)."""
     @property
-    def rate(self) -> Fraction | None: ...
+    def rate(self) -> Fraction | None:
+        """The rate on whose frames all key times lie, a Fraction in frames per second, or None."""
     @property
-    def span(self) -> tuple[float, float]: ...
+    def span(self) -> tuple[float, float]:
+        """The first and the last key time in seconds."""
     @property
-    def duration(self) -> float: ...
+    def duration(self) -> float:
+        """Seconds from the first key to the last."""
     @property
-    def key_count(self) -> int: ...
+    def key_count(self) -> int:
+        """How many keys all tracks have together."""
     @property
-    def time_offset(self) -> int: ...
+    def time_offset(self) -> int:
+        """The whole second from which the times of the clip are counted where the file's clock counts
+        from 1970 or so; 0 for most files. `at`, `start` and `end` accept times of the file, too."""
     @property
-    def is_world(self) -> bool: ...
+    def is_world(self) -> bool:
+        """Whether rotations and translations are relative to the world instead of the parent."""
     @property
-    def path(self) -> os.PathLike[str] | None: ...
+    def path(self) -> os.PathLike[str] | None:
+        """The file that it was read from, or None."""
     def __len__(self) -> int: ...
-    def times(self, track: int | str) -> NDArray[np.float64]: ...
-    def keys(self, track: int | str, *, order: _Order = "xyzw") -> _Single: ...
+    def times(self, track: int | str) -> NDArray[np.float64]:
+        """The key times of a track, by its index or name: (keys,), float64 in seconds."""
+    def keys(self, track: int | str, *, order: _Order = "xyzw") -> _Single:
+        """The keys of a track, by its index or name: (keys, 4), float32; `order` says what the
+        components are."""
     def translations(
         self, track: int | str
-    ) -> tuple[NDArray[np.float64], _Places] | None: ...
+    ) -> tuple[NDArray[np.float64], _Places] | None:
+        """The translation keys of a track, by its index or name: their times (keys,) in seconds, and
+        their values (keys, 3), float32 (float64 where the track has one of the `origins`), in the file's
+        units; None for a track without."""
     def scales(
         self, track: int | str
-    ) -> tuple[NDArray[np.float64], _Single] | None: ...
-    def frames(self, fps: _Rate) -> int: ...
-    # Lists of times of different lengths give a list of arrays, and `as_rotation` gives SciPy's.
+    ) -> tuple[NDArray[np.float64], _Single] | None:
+        """The scale keys of a track; otherwise as `translations`."""
+    def frames(self, fps: _Rate) -> int:
+        """How many frames the clip has at a rate, from its first key to its last."""
+    # With lists of times of different lengths, the result is a list of arrays; with `as_rotation`, it is a
+    # `scipy.spatial.transform.Rotation`.
     @overload
     def evaluate(
         self,
@@ -246,7 +274,8 @@ class Clip:
         tension: float | None = None,
         continuity: float | None = None,
         bias: float | None = None,
-    ) -> _Single: ...
+    ) -> _Single:
+        """As `Engine.evaluate`, by an engine that is shared by all calls and chooses its device."""
     @overload
     def evaluate(
         self,
@@ -322,11 +351,23 @@ class Clip:
         continuity: float | None = None,
         bias: float | None = None,
     ) -> DeviceArray: ...
-    def select(self, tracks: Sequence[str] | Sequence[int]) -> Clip: ...
-    def cut(self, start: float | None = None, end: float | None = None) -> Clip: ...
-    def retime(self, *, speed: float | None = None, start: float | None = None) -> Clip: ...
+    def select(self, tracks: Sequence[str] | Sequence[int]) -> Clip:
+        """The clip with some of its joints, `tracks`, by their names or indices, in this order. Their parents must be
+        included, too."""
+    def cut(self, start: float | None = None, end: float | None = None) -> Clip:
+        """The part of the clip from `start` to `end` (in seconds); without `start` from its first key, without `end` to
+        its last. Keys keep their times and bits. A channel without a key at a cut gets one there, of its curve. Steps,
+        lines and arcs stay the same; smooth curves change in the intervals next to the cuts."""
+    def retime(self, *, speed: float | None = None, start: float | None = None) -> Clip:
+        """Returns the clip, played `speed` times as fast. The first key is moved to `start` (in seconds); without `start`,
+        the key stays at its time. Keys keep their bits; velocities and tangents are multiplied by the speed."""
     @staticmethod
-    def concat(clips: Sequence[Clip], *, gap: float | None = None) -> Clip: ...
+    def concat(clips: Sequence[Clip], *, gap: float | None = None) -> Clip:
+        """Several clips, one after another. Joints are matched by name, and have the order and the name of the first clip.
+        `gap`: the seconds from the last key of a clip to the first key of the next; by default one frame, if the clips have
+        a common rate. With `gap=0.0`, one clip ends in the pose in which the next begins, which is kept once. All keys
+        keep their bits, and those of the first clip their times. Clips that differ in their joints, offsets, scalars or
+        interpolation are refused."""
     def root_motion(
         self,
         rule: Literal["keep", "in-place", "extract"],
@@ -334,7 +375,11 @@ class Clip:
         up: _Ground = "y",
         axis: _Axis | None = None,
         joint: str | None = None,
-    ) -> Clip: ...
+    ) -> Clip:
+        """The clip without its motion over the ground (`rule` "in-place"), or with a joint, `root_motion`, that has it and
+        carries the root ("extract"), at the key times of all tracks. `up` and `axis` are those of `features.heading`;
+        `joint` names the root, by default the joint that moves and whose ancestors do not. Scalars keep their keys; cubic
+        splines become lines."""
     def sampler(
         self,
         *,
@@ -347,7 +392,9 @@ class Clip:
         tension: float | None = None,
         continuity: float | None = None,
         bias: float | None = None,
-    ) -> Sampler: ...
+    ) -> Sampler:
+        """A `Sampler`: it evaluates single rotations and poses, in loops that need one at a time, with the bits of
+        `evaluate`. It prepares the clip once; the options are those of `evaluate`."""
     def plot(
         self,
         track: int | str | None = None,
@@ -363,7 +410,9 @@ class Clip:
         tension: float | None = None,
         continuity: float | None = None,
         bias: float | None = None,
-    ) -> Any: ...
+    ) -> Any:
+        """Draws the components of a track over time, with its keys as dots, with matplotlib; returns the axes of
+        matplotlib."""
     def view(
         self,
         *,
@@ -372,10 +421,14 @@ class Clip:
         start: float | None = None,
         end: float | None = None,
         height: int = 520,
-    ) -> View: ...
+    ) -> View:
+        """The page of `tumble view`: the bones or boxes moving, to be looked at from any side. The last
+        value of a notebook's cell is shown in its output; `save(path)` writes the page, `html` is
+        its text."""
 
 @final
 class Engine:
+    """Evaluates clips on one device, which stays open."""
     def __new__(
         cls,
         device: str | int | None = None,
@@ -386,10 +439,13 @@ class Engine:
         cache: _Path | None = None,
     ) -> Engine: ...
     @property
-    def device(self) -> str: ...
+    def device(self) -> str:
+        """The name of the device. With "auto", it is the device for small calls."""
     def __copy__(self) -> Engine: ...
     def __deepcopy__(self, _memo: Any, /) -> Engine: ...
-    def warm(self, *, method: str = "bessel-overhauser") -> None: ...
+    def warm(self, *, method: str = "bessel-overhauser") -> None:
+        """Compiles the kernels of a method on a Vulkan device in advance. Otherwise they are compiled by the first call that
+        needs them; this takes milliseconds, with some drivers seconds. On the CPU this does nothing."""
     @overload
     def evaluate(
         self,
@@ -415,7 +471,9 @@ class Engine:
         tension: float | None = None,
         continuity: float | None = None,
         bias: float | None = None,
-    ) -> _Single: ...
+    ) -> _Single:
+        """The rotation of every track at every sample, written by the engine into NumPy's memory:
+        float32, (tracks, frames, 4), unit quaternions."""
     @overload
     def evaluate(
         self,
@@ -522,7 +580,10 @@ class Engine:
         tension: float | None = None,
         continuity: float | None = None,
         bias: float | None = None,
-    ) -> dict[str, _Single]: ...
+    ) -> dict[str, _Single]:
+        """The joints and bodies of a robot at samples of a motion: a dict of float32 arrays with the names of mjlab's
+        files, `joint_pos` and `joint_vel` (frames, joints), `body_pos_w` (frames, bodies, 3), `body_quat_w` (…, 4),
+        `body_lin_vel_w` and `body_ang_vel_w` (…, 3), in the world."""
     def scalars(
         self,
         clip: Clip,
@@ -544,7 +605,11 @@ class Engine:
         tension: float | None = None,
         continuity: float | None = None,
         bias: float | None = None,
-    ) -> _Single: ...
+    ) -> _Single:
+        """The scalars of a clip, such as the angles of a robot's joints, at every sample: float32, (scalars, frames), with
+        `layout="frame"` (frames, scalars). `quantity`: "value", "velocity" (per second: the derivative of the curve) or
+        "acceleration". `names` chooses scalars, in this order; the default are all, in the order of `clip.scalars`. Other
+        keywords are those of `evaluate`."""
     @overload
     def velocity(
         self,
@@ -568,7 +633,11 @@ class Engine:
         tension: float | None = None,
         continuity: float | None = None,
         bias: float | None = None,
-    ) -> _Single: ...
+    ) -> _Single:
+        """The angular velocity of every track at every sample: float32, (tracks, frames, 3) in rad/s,
+        about the axes of the "body" or of its "parent", or in the "world": that of the rotation in the world,
+        along the skeleton, about the world's axes. Of a track without a parent the last two are the same. Other
+        keywords are those of `evaluate`."""
     @overload
     def velocity(
         self,
@@ -616,7 +685,8 @@ class Engine:
         tension: float | None = None,
         continuity: float | None = None,
         bias: float | None = None,
-    ) -> _Single: ...
+    ) -> _Single:
+        """The angular acceleration in rad/s²; otherwise as `velocity`."""
     @overload
     def acceleration(
         self,
@@ -664,7 +734,9 @@ class Engine:
         tension: float | None = None,
         continuity: float | None = None,
         bias: float | None = None,
-    ) -> _Single: ...
+    ) -> _Single:
+        """The rotations as matrices for column vectors: float32, (tracks, frames, 3, 3), or with `columns=4`
+        (tracks, frames, 3, 4), the last column, the translation, 0. Other keywords are those of `evaluate`."""
     @overload
     def matrices(
         self,
@@ -710,7 +782,9 @@ class Engine:
         tension: float | None = None,
         continuity: float | None = None,
         bias: float | None = None,
-    ) -> _Single: ...
+    ) -> _Single:
+        """The rotations as axes and angles: float32, (tracks, frames, 4), x y z of the axis, a unit vector, and
+        the angle, 0 to 360 degrees, or radians. Other keywords are those of `evaluate`."""
     def euler(
         self,
         clip: Clip,
@@ -733,7 +807,10 @@ class Engine:
         tension: float | None = None,
         continuity: float | None = None,
         bias: float | None = None,
-    ) -> _Single: ...
+    ) -> _Single:
+        """The rotations as Euler angles: float32, (tracks, frames, 3), degrees or radians. `sequence`
+        is as SciPy has it: "XYZ" about turned axes (intrinsic), "xyz" about fixed ones (extrinsic).
+        Other keywords are those of `evaluate`."""
     def rotation_vectors(
         self,
         clip: Clip,
@@ -754,7 +831,9 @@ class Engine:
         tension: float | None = None,
         continuity: float | None = None,
         bias: float | None = None,
-    ) -> _Single: ...
+    ) -> _Single:
+        """The rotations as rotation vectors: float32, (tracks, frames, 3), the axis times the angle in radians, at most
+        pi, as SciPy's `as_rotvec` and the poses of SMPL. Other keywords are those of `evaluate`."""
     @overload
     def encoded(
         self,
@@ -781,7 +860,9 @@ class Engine:
         tension: float | None = None,
         continuity: float | None = None,
         bias: float | None = None,
-    ) -> NDArray[Any]: ...
+    ) -> NDArray[Any]:
+        """The rotations in the representation of that name: "f32", "f16", "snorm16", "axis-angle", "matrix", "matrix-3x4",
+        "euler" … (`tumble.encodings()`), an array (tracks, frames, …). Every device gives the same bits."""
     @overload
     def encoded(
         self,
@@ -828,7 +909,10 @@ class Engine:
         tension: float | None = None,
         continuity: float | None = None,
         bias: float | None = None,
-    ) -> tuple[_Places, _Single, _Single]: ...
+    ) -> tuple[_Places, _Single, _Single]:
+        """Whole poses relative to the parents: translations (tracks, frames, 3), rotations
+        (tracks, frames, 4), x y z w, each with the sign that continues the one before it, and scales
+        (tracks, frames, 3), float32; translations are float64 where the clip has `origins`. Keywords are those of `evaluate`."""
     def world(
         self,
         clip: Clip,
@@ -848,7 +932,10 @@ class Engine:
         tension: float | None = None,
         continuity: float | None = None,
         bias: float | None = None,
-    ) -> tuple[_Places, _Single]: ...
+    ) -> tuple[_Places, _Single]:
+        """Where the joints of a skeleton are in the world: positions (tracks, frames, 3) and rotations
+        (tracks, frames, 4), x y z w, float32; positions are float64 where the clip has `origins`. Keywords are
+        those of `evaluate`."""
     @overload
     def smooth(
         self,
@@ -862,7 +949,8 @@ class Engine:
         layout: Literal["track"] = "track",
         order: Literal["xyzw"] = "xyzw",
         out: None = None,
-    ) -> Clip: ...
+    ) -> Clip:
+        """Smooths samples. Returns a float32 array of the same shape, or a clip if `samples` is a `Clip`."""
     @overload
     def smooth(
         self,
@@ -884,7 +972,10 @@ class Engine:
         *,
         order: _Order = "xyzw",
         out: _Single | None = None,
-    ) -> _Single: ...
+    ) -> _Single:
+        """Layers of rotations blended into one: the weighted sum of each rotation, normalised, every layer with
+        the sign that is nearer to the first one's. Weights need not add up to 1. Arrays have no names, so tracks are
+        combined by index: bring those of clips into one order by `Clip.names` first."""
     def mix(
         self,
         first: _Keys,
@@ -893,7 +984,9 @@ class Engine:
         *,
         order: _Order = "xyzw",
         out: _Single | None = None,
-    ) -> _Single: ...
+    ) -> _Single:
+        """Slerp, the shorter way, from every rotation of the first array (…, 4) to that of the second, by a `weight`
+        from 0 to 1. Tracks are combined by index, as in `blend`."""
     def add(
         self,
         base: _Keys,
@@ -904,7 +997,8 @@ class Engine:
         layout: _Layout = "track",
         order: _Order = "xyzw",
         out: _Single | None = None,
-    ) -> _Single: ...
+    ) -> _Single:
+        """A layer of rotations added to a base: `base · (reference⁻¹ layer)^weight`."""
     def local_to_model(
         self,
         rotations: _Keys,
@@ -916,7 +1010,10 @@ class Engine:
         inverse_bind: ArrayLike | None = None,
         layout: _Layout = "track",
         order: _Order = "xyzw",
-    ) -> _Single: ...
+    ) -> _Single:
+        """The matrices of a skeleton's joints in the model, from its roots down: `M = M_parent T R S`, and `M B`
+        with inverse bind matrices `B`, as vertices are skinned with. float32, (tracks, frames, 3, 4), for column
+        vectors, the last column the translation; a view."""
     def follow(
         self,
         times: _Arrays | None,
@@ -936,12 +1033,13 @@ class Engine:
         frame: _Frame = "minimal",
         up: _Up = (0.0, 1.0, 0.0),
         twist: _Twist = "spread",
-        speed: Literal["keys", "constant"] | tuple[float, float] = "keys",
+        speed: Literal["as-keyed", "keys", "constant"] | tuple[float, float] = "keys",
         forward: str = "z",
         upward: str = "y",
         layout: _Layout = "track",
         order: _Order = "xyzw",
-    ) -> tuple[_Places, _Single]: ...
+    ) -> tuple[_Places, _Single]:
+        """Bodies on paths: the position of each at every sample, and the rotation from its axes to the world's."""
     def stream(
         self,
         clip: Clip,
@@ -963,7 +1061,10 @@ class Engine:
         tension: float | None = None,
         continuity: float | None = None,
         bias: float | None = None,
-    ) -> Chunks: ...
+    ) -> Chunks:
+        """The rotations in pieces of about `chunk` rotations, for results larger than memory: an
+        iterator of `Chunk`s, in the order of the whole result. Other keywords are those of
+        `evaluate`."""
     def batch(
         self,
         rows: Any,
@@ -983,7 +1084,11 @@ class Engine:
         tension: float | None = None,
         continuity: float | None = None,
         bias: float | None = None,
-    ) -> Any: ...
+    ) -> Any:
+        """Clips as rows of a record batch, in and out by Arrow: for Spark, Daft and Ray Data. `rows`, of pyarrow's or with
+        Arrow's C interface, have `times`, a list of seconds, and `keys`, a list of 4 numbers for each time of each track.
+        They are replaced by `tracks`, `frames` and `rotations`, track after track; other columns are kept. Keywords are
+        those of `evaluate`. No row's result depends on the others."""
     def verify(
         self,
         clip: Clip,
@@ -1002,63 +1107,89 @@ class Engine:
         tension: float | None = None,
         continuity: float | None = None,
         bias: float | None = None,
-    ) -> Verification: ...
+    ) -> Verification:
+        """Compares the device with the CPU, bit by bit, and both with a reference in float64 that
+        shares no code with them. Keywords are those of `evaluate`."""
 
 @final
 class Chunks:
+    """An iterator of `Chunk`s; see `Engine.stream`."""
     def __iter__(self) -> Chunks: ...
     def __next__(self) -> Chunk: ...
 
 @final
 class Chunk:
+    """A part of a result, contiguous in the whole."""
     def __eq__(self, other: object, /) -> bool: ...
     __hash__: ClassVar[None]  # type: ignore[assignment]
     @property
-    def tracks(self) -> slice[int, int, None]: ...
+    def tracks(self) -> slice[int, int, None]:
+        """Its tracks, a slice of all."""
     @property
-    def frames(self) -> slice[int, int, None]: ...
+    def frames(self) -> slice[int, int, None]:
+        """Its frames, a slice of all."""
     @property
-    def rotations(self) -> _Single: ...
+    def rotations(self) -> _Single:
+        """The rotations: float32, (tracks, frames, 4), or (frames, tracks, 4) if that is the layout."""
 
 @final
 class Verification:
+    """The result of `Engine.verify`."""
     def __eq__(self, other: object, /) -> bool: ...
     __hash__: ClassVar[None]  # type: ignore[assignment]
     @property
-    def method(self) -> str: ...
+    def method(self) -> str:
+        """The method; "authored" where tracks have different methods."""
     @property
-    def device(self) -> str | None: ...
+    def device(self) -> str | None:
+        """The Vulkan device; None on the CPU, where nothing is compared between devices."""
     @property
-    def rotations(self) -> int: ...
+    def rotations(self) -> int:
+        """Rotations compared."""
     @property
-    def differing(self) -> int: ...
+    def differing(self) -> int:
+        """Rotations whose bits differ between the device and the CPU."""
     @property
-    def max_error(self) -> float: ...
+    def max_error(self) -> float:
+        """The largest angle between a result and the reference in rad."""
     @property
-    def rms_error(self) -> float: ...
+    def rms_error(self) -> float:
+        """The root mean square of that angle in rad."""
     @property
-    def max_norm_error(self) -> float: ...
+    def max_norm_error(self) -> float:
+        """The largest distance of a norm from 1."""
     @property
-    def error_bound(self) -> float: ...
+    def error_bound(self) -> float:
+        """The largest `max_error` that is allowed in rad."""
     @property
-    def passes(self) -> bool: ...
+    def passes(self) -> bool:
+        """Whether a Vulkan device was compared with the CPU, all bits agree and all errors are within
+        their bounds, those of velocities, matrices and other outputs included."""
     @property
-    def verdict(self) -> Literal["passed", "reference-only", "nothing", "failed"]: ...
+    def verdict(self) -> Literal["passed", "reference-only", "nothing", "failed"]:
+        """"passed", "reference-only" (the CPU is near the reference, and no device took part), "nothing"
+        (there was no sample) or "failed"."""
 
 @final
 class File:
+    """The clips of a file, by their indices or names."""
     def __eq__(self, other: object, /) -> bool: ...
     def __hash__(self) -> int: ...
     @property
-    def clips(self) -> list[Clip]: ...
+    def clips(self) -> list[Clip]:
+        """The clips, in the file's order."""
     @property
-    def names(self) -> list[str]: ...
+    def names(self) -> list[str]:
+        """The clips' names; their indices where they have none."""
     @property
-    def clip(self) -> Clip: ...
+    def clip(self) -> Clip:
+        """The only clip; an error where there are several."""
     @property
-    def path(self) -> os.PathLike[str]: ...
+    def path(self) -> os.PathLike[str]:
+        """The path of the file."""
     @property
-    def refused(self) -> list[str]: ...
+    def refused(self) -> list[str]:
+        """Why other clips of the file could not be read."""
     def __copy__(self) -> File: ...
     def __deepcopy__(self, _memo: Any, /) -> File: ...
     def __len__(self) -> int: ...
@@ -1090,7 +1221,8 @@ def evaluate(
     tension: float | None = None,
     continuity: float | None = None,
     bias: float | None = None,
-) -> _Single: ...
+) -> _Single:
+    """Interpolates keys: `Clip(times, keys, order=order)`, evaluated by a shared engine."""
 @overload
 def evaluate(
     times: _Arrays,
@@ -1184,7 +1316,9 @@ def load(
     body_model: _Path | None = None,
     scale: float | Literal["metres"] | None = None,
     up: _UpAxis | None = None,
-) -> File: ...
+) -> File:
+    """Reads a motion file of any format (docs/formats.md lists them). An invalid file raises an `InputError` with the
+    position of the error; oddities are reported as `InputWarning`."""
 def save(
     file: _Path,
     clips: Clip | File | Sequence[Clip],
@@ -1215,8 +1349,10 @@ def save(
     tension: float | None = None,
     continuity: float | None = None,
     bias: float | None = None,
-) -> None: ...
-def devices() -> list[str]: ...
+) -> None:
+    """Writes clips to a file, atomically; the format is that of the file's ending."""
+def devices() -> list[str]:
+    """The names of the Vulkan devices, in the order of their indices; empty where there is no Vulkan."""
 def load_all(
     paths: Sequence[_Path],
     keywords: dict[str, Any],
@@ -1340,10 +1476,13 @@ def retarget(
     rest_frame: int | None = None,
     scale: Literal["hips", "legs"] | float = "hips",
     axes: _Array | None = None,
-) -> tuple[Clip, dict[str, Any]]: ...
+) -> tuple[Clip, dict[str, Any]]:
+    """Carries a motion over to another skeleton; returns the clip and a report."""
 def positions_of_humanml3d(features: _Array) -> _Double: ...
-def encodings() -> dict[str, str]: ...
-def methods() -> dict[str, str]: ...
+def encodings() -> dict[str, str]:
+    """The names of the representations of rotations (`Engine.encoded`), each with a short description."""
+def methods() -> dict[str, str]:
+    """The names of the methods, each with a short description."""
 def load_drivers() -> None: ...
 def page(clips: Clip | File | Sequence[Clip], options: Sequence[str]) -> str: ...
 def panic() -> None: ...
@@ -1431,132 +1570,186 @@ def merge(folder: str) -> tuple[int, str]: ...
 
 @final
 class Spread:
+    """The mean, the root mean square and the largest of many differences."""
     def __eq__(self, other: object, /) -> bool: ...
     __hash__: ClassVar[None]  # type: ignore[assignment]
     @property
-    def mean(self) -> float: ...
+    def mean(self) -> float:
+        """The mean."""
     @property
-    def rms(self) -> float: ...
+    def rms(self) -> float:
+        """The root of the mean square."""
     @property
-    def largest(self) -> float: ...
+    def largest(self) -> float:
+        """The largest."""
 
 @final
 class ArrayDifference:
+    """How far two arrays of one shape are apart."""
     def __eq__(self, other: object, /) -> bool: ...
     __hash__: ClassVar[None]  # type: ignore[assignment]
     @property
-    def numbers(self) -> int: ...
+    def numbers(self) -> int:
+        """The number of numbers that are compared."""
     @property
-    def differing(self) -> int: ...
+    def differing(self) -> int:
+        """The number of numbers that differ."""
     @property
-    def difference(self) -> Spread: ...
+    def difference(self) -> Spread:
+        """The differences of numbers."""
     @property
-    def largest_at(self) -> list[int]: ...
+    def largest_at(self) -> list[int]:
+        """The indices of the largest difference."""
     @property
-    def rotation(self) -> Spread | None: ...
+    def rotation(self) -> Spread | None:
+        """The angles in degrees, if the arrays contain rotations (four numbers each); otherwise None."""
     @property
-    def largest_rotation_at(self) -> list[int] | None: ...
+    def largest_rotation_at(self) -> list[int] | None:
+        """The indices of the rotation with the largest angle; None if there are no rotations."""
 
 @final
 class ChannelDifference:
+    """The differences of a channel of two clips."""
     def __eq__(self, other: object, /) -> bool: ...
     __hash__: ClassVar[None]  # type: ignore[assignment]
     @property
-    def mean(self) -> float: ...
+    def mean(self) -> float:
+        """The mean difference."""
     @property
-    def rms(self) -> float: ...
+    def rms(self) -> float:
+        """The root of the mean square of the differences."""
     @property
-    def largest(self) -> float: ...
+    def largest(self) -> float:
+        """The largest difference."""
     @property
-    def track(self) -> str: ...
+    def track(self) -> str:
+        """The name of the track with the largest difference."""
     @property
-    def time(self) -> float: ...
+    def time(self) -> float:
+        """The time of the largest difference in seconds, on the clock of the first clip."""
     @property
-    def frame(self) -> float | None: ...
+    def frame(self) -> float | None:
+        """The frame of the largest difference, counted in the first clip from 0 at its first key; None if it has no rate."""
 
 @final
 class JointDifference:
+    """The differences of one track of two clips."""
     def __eq__(self, other: object, /) -> bool: ...
     __hash__: ClassVar[None]  # type: ignore[assignment]
     @property
-    def track(self) -> str: ...
+    def track(self) -> str:
+        """The name of the track."""
     @property
-    def rotation(self) -> ChannelDifference: ...
+    def rotation(self) -> ChannelDifference:
+        """The differences of rotations in degrees."""
     @property
-    def translation(self) -> ChannelDifference | None: ...
+    def translation(self) -> ChannelDifference | None:
+        """The differences of translations, as lengths; None if neither clip has translations."""
     @property
-    def scale(self) -> ChannelDifference | None: ...
+    def scale(self) -> ChannelDifference | None:
+        """The differences of scales, as lengths; None if neither clip has scales."""
 
 @final
 class ClipDifference:
+    """How far two clips are apart."""
     def __eq__(self, other: object, /) -> bool: ...
     __hash__: ClassVar[None]  # type: ignore[assignment]
     @property
-    def tracks(self) -> int: ...
+    def tracks(self) -> int:
+        """The number of tracks that both clips have."""
     @property
-    def missing(self) -> tuple[list[str], list[str]]: ...
+    def missing(self) -> tuple[list[str], list[str]]:
+        """The names of the tracks that only one clip has: a list for the first clip, and one for the second."""
     @property
-    def samples(self) -> int: ...
+    def samples(self) -> int:
+        """The number of samples of each track."""
     @property
-    def span(self) -> tuple[float, float]: ...
+    def span(self) -> tuple[float, float]:
+        """The first and the last time in seconds."""
     @property
-    def identical(self) -> int: ...
+    def identical(self) -> int:
+        """The number of rotations whose bits are the same."""
     @property
-    def rotation(self) -> ChannelDifference: ...
+    def rotation(self) -> ChannelDifference:
+        """The differences of rotations in degrees."""
     @property
-    def translation(self) -> ChannelDifference | None: ...
+    def translation(self) -> ChannelDifference | None:
+        """The differences of translations, as lengths; None if neither clip has translations."""
     @property
-    def scale(self) -> ChannelDifference | None: ...
+    def scale(self) -> ChannelDifference | None:
+        """The differences of scales, as lengths; None if neither clip has scales."""
     @property
-    def joints(self) -> list[JointDifference]: ...
+    def joints(self) -> list[JointDifference]:
+        """The differences of each track, in the order of the first clip."""
 
 @final
 class PathStatistics:
+    """The statistics of errors of one kind, by the names of `evo`."""
     def __eq__(self, other: object, /) -> bool: ...
     __hash__: ClassVar[None]  # type: ignore[assignment]
     @property
-    def rmse(self) -> float: ...
+    def rmse(self) -> float:
+        """The root of the mean square."""
     @property
-    def mean(self) -> float: ...
+    def mean(self) -> float:
+        """The mean."""
     @property
-    def median(self) -> float: ...
+    def median(self) -> float:
+        """The median."""
     @property
-    def std(self) -> float: ...
+    def std(self) -> float:
+        """The standard deviation."""
     @property
-    def min(self) -> float: ...
+    def min(self) -> float:
+        """The smallest."""
     @property
-    def max(self) -> float: ...
+    def max(self) -> float:
+        """The largest."""
 
 @final
 class PathErrors:
+    """How far an estimated path is from its reference."""
     def __eq__(self, other: object, /) -> bool: ...
     __hash__: ClassVar[None]  # type: ignore[assignment]
     @property
-    def times_of(self) -> int: ...
+    def times_of(self) -> int:
+        """The index of the clip whose poses are compared, 0 or 1: the clip with fewer poses."""
     @property
-    def poses(self) -> int: ...
+    def poses(self) -> int:
+        """The number of poses that are compared."""
     @property
-    def outside(self) -> int: ...
+    def outside(self) -> int:
+        """The number of poses that are not compared because they are outside the times of the other clip."""
     @property
-    def in_gaps(self) -> int: ...
+    def in_gaps(self) -> int:
+        """The number of poses that are not compared because they are in gaps of the other clip."""
     @property
-    def span(self) -> tuple[float, float]: ...
+    def span(self) -> tuple[float, float]:
+        """First and last time in seconds."""
     @property
-    def scale(self) -> float: ...
+    def scale(self) -> float:
+        """The scale of the alignment. The alignment scales the estimate, then rotates it, then translates it."""
     @property
-    def rotation(self) -> list[float]: ...
+    def rotation(self) -> list[float]:
+        """The rotation of the alignment, x y z w."""
     @property
-    def translation(self) -> list[float]: ...
+    def translation(self) -> list[float]:
+        """The translation of the alignment."""
     @property
-    def ape_translation(self) -> PathStatistics: ...
+    def ape_translation(self) -> PathStatistics:
+        """Absolute errors of the positions, lengths."""
     @property
-    def ape_rotation(self) -> PathStatistics: ...
+    def ape_rotation(self) -> PathStatistics:
+        """Absolute errors of the rotations in degrees."""
     @property
-    def rpe_translation(self) -> PathStatistics | None: ...
+    def rpe_translation(self) -> PathStatistics | None:
+        """Relative errors of the positions, lengths; None without `rpe`."""
     @property
-    def rpe_rotation(self) -> PathStatistics | None: ...
+    def rpe_rotation(self) -> PathStatistics | None:
+        """Relative errors of the rotations in degrees; None without `rpe`."""
     @property
-    def rpe_count(self) -> int: ...
+    def rpe_count(self) -> int:
+        """The number of steps for which relative errors are computed."""
 
 @overload
 def compare(
@@ -1569,7 +1762,8 @@ def compare(
     end: float | None = None,
     world: bool = False,
     engine: Engine | None = None,
-) -> ClipDifference: ...
+) -> ClipDifference:
+    """Compares two clips, or two arrays: the largest and the mean difference, and where it is."""
 @overload
 def compare(
     first: _Array,
@@ -1592,26 +1786,36 @@ def path_errors(
     max_gap: float | None = None,
     track: int | str | None = None,
     engine: Engine | None = None,
-) -> PathErrors: ...
+) -> PathErrors:
+    """The errors of an estimated trajectory against its reference, as in benchmarks of odometry and SLAM. The
+    numbers are the same as those of the program `evo`."""
 
 @final
 class Reduction:
+    """A clip with few keys, and how far it is from its samples."""
     def __eq__(self, other: object, /) -> bool: ...
     __hash__: ClassVar[None]  # type: ignore[assignment]
     @property
-    def clip(self) -> Clip: ...
+    def clip(self) -> Clip:
+        """The clip with few keys."""
     @property
-    def keys_before(self) -> int: ...
+    def keys_before(self) -> int:
+        """Keys of all channels before."""
     @property
-    def keys_after(self) -> int: ...
+    def keys_after(self) -> int:
+        """Keys of all channels that are left."""
     @property
-    def times(self) -> _Double: ...
+    def times(self) -> _Double:
+        """The times of the samples in seconds, (samples,)."""
     @property
-    def angles(self) -> _Double: ...
+    def angles(self) -> _Double:
+        """The largest angle of all joints at each sample in degrees: (samples,)."""
     @property
-    def distances(self) -> _Double: ...
+    def distances(self) -> _Double:
+        """The largest distance of all joints at each sample, (samples,)."""
     @property
-    def bounds(self) -> tuple[float, float]: ...
+    def bounds(self) -> tuple[float, float]:
+        """The bounds that hold: an angle in degrees, and a distance."""
 
 def reduce(
     clip: Clip,
@@ -1623,16 +1827,27 @@ def reduce(
     together: bool = False,
     fps: _Rate | None = None,
     engine: Engine | None = None,
-) -> Reduction: ...
+) -> Reduction:
+    """Removes keys from a clip. The curves of the remaining keys are within a tolerance of all samples."""
 
 @final
 class DeviceArray:
+    """A result in the memory of a device, made by `Engine.evaluate(…, device_array=True)` on an NVIDIA card, or by a
+    `MotionLibrary(…, device=…)`: `torch.from_dlpack`, `cupy.from_dlpack` and `jax.dlpack.from_dlpack` import it without a
+    copy, and so do libraries that use `__cuda_array_interface__`. The card may still be writing the result. The stream
+    that imports it waits for the card; your Python code does not. All imported tensors share its memory, which is freed
+    after the last of them."""
     @property
-    def shape(self) -> tuple[int, ...]: ...
+    def shape(self) -> tuple[int, ...]:
+        """The shape, as of a NumPy array."""
     @property
-    def dtype(self) -> np.dtype[Any]: ...
+    def dtype(self) -> np.dtype[Any]:
+        """The type of the numbers, NumPy's."""
     @property
-    def waited_by(self) -> Literal["stream", "host"]: ...
+    def waited_by(self) -> Literal["stream", "host"]:
+        """How readers are ordered after the device's writing: "stream" if the stream that takes the array waits for it,
+        "host" if the host has waited already: for results in memory of the host, and if the Vulkan device exports no
+        semaphore or CUDA takes none."""
     @property
     def __cuda_array_interface__(self) -> dict[str, Any]: ...
     def __dlpack__(
@@ -1646,18 +1861,24 @@ class DeviceArray:
     def __dlpack_device__(self) -> tuple[int, int]: ...
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]: ...
     def __len__(self) -> int: ...
-    def numpy(self) -> NDArray[Any]: ...
+    def numpy(self) -> NDArray[Any]:
+        """Copies the result to the host: a NumPy array of the same shape and type."""
 
 @final
 class Sampler:
+    """Evaluates a clip at one time after another, for loops that need one pose at a time. Made by `Clip.sampler`."""
     @property
-    def bytes_per_key(self) -> float: ...
+    def bytes_per_key(self) -> float:
+        """The memory that the clip takes for each key, in bytes: if the clip keeps segments, 64 or more for arcs (slerp),
+        and 144 to 208 or more for polynomials; if the clip keeps its keys instead, 16 or more."""
     def __len__(self) -> int: ...
     def __copy__(self) -> Sampler: ...
     def __deepcopy__(self, memo: Any, /) -> Sampler: ...
     def sample(
         self, track: int | str, time: float, *, order: _Order = "xyzw"
-    ) -> _Single: ...
+    ) -> _Single:
+        """The rotation of a track, by its index or name, at a time in seconds: float32, (4,), a unit quaternion.
+        `order`: "xyzw" or "wxyz"."""
     def pose(
         self,
         time: float,
@@ -1665,10 +1886,12 @@ class Sampler:
         tracks: Sequence[int | str] | None = None,
         out: _Single | None = None,
         order: _Order = "xyzw",
-    ) -> _Single: ...
+    ) -> _Single:
+        """The rotations at a time in seconds: float32, (tracks, 4), unit quaternions."""
 
 @final
 class Crowd:
+    """Many instances of a skeleton, each of which plays clips at a separate time and speed: poses for skinning."""
     def __new__(
         cls,
         clips: Sequence[Clip],
@@ -1685,11 +1908,14 @@ class Crowd:
         engine: Engine | None = None,
     ) -> Crowd: ...
     @property
-    def instances(self) -> int: ...
+    def instances(self) -> int:
+        """Number of instances."""
     @property
-    def joints(self) -> int: ...
+    def joints(self) -> int:
+        """Joints of the skeleton."""
     @property
-    def layers(self) -> int: ...
+    def layers(self) -> int:
+        """Layers of an instance."""
     def set(
         self,
         instances: ArrayLike,
@@ -1702,8 +1928,10 @@ class Crowd:
         weight: ArrayLike = 1.0,
         additive: bool = False,
         mask: int | None = None,
-    ) -> None: ...
-    def advance(self, seconds: float) -> None: ...
+    ) -> None:
+        """Sets what instances play from now on."""
+    def advance(self, seconds: float) -> None:
+        """Moves the clock on, by the ticks nearest to some seconds."""
     @overload
     def evaluate(
         self,
@@ -1711,7 +1939,9 @@ class Crowd:
         *,
         dtype: Literal["float32"] = "float32",
         out: _Single | None = None,
-    ) -> _Single: ...
+    ) -> _Single:
+        """The poses of all instances at the clock's time: (instances, joints, 3, 4), for column vectors, the
+        last column the translation; or of "rotations" (instances, joints, 4), x y z w."""
     @overload
     def evaluate(
         self,
@@ -1720,17 +1950,20 @@ class Crowd:
         dtype: DTypeLike,
         out: NDArray[Any] | None = None,
     ) -> NDArray[Any]: ...
-    def times(self, layer: int = 0) -> _Double: ...
+    def times(self, layer: int = 0) -> _Double:
+        """The time in seconds of its clip that each instance plays in a layer: (instances,), float64."""
 
 @final
 class Surface:
+    """A surface, on which routes are found: a mesh, or a net of Bézier control points."""
     def __eq__(self, other: object, /) -> bool: ...
     def __hash__(self) -> int: ...
     def __new__(
         cls, vertices: ArrayLike, faces: ArrayLike, *, weld: float = 0.0
     ) -> Surface: ...
     @classmethod
-    def net(cls, points: ArrayLike) -> Surface: ...
+    def net(cls, points: ArrayLike) -> Surface:
+        """A Bézier surface of control points (m, n, 3)."""
     def route(
         self,
         start: ArrayLike,
@@ -1742,7 +1975,8 @@ class Surface:
         finest: float | None = None,
         max_slope: float | None = None,
         up: _Up = (0.0, 1.0, 0.0),
-    ) -> Route: ...
+    ) -> Route:
+        """The route between the points of the surface that are nearest to `start` and `goal`."""
     def routes(
         self,
         starts: ArrayLike,
@@ -1754,7 +1988,9 @@ class Surface:
         finest: float | None = None,
         max_slope: float | None = None,
         up: _Up = (0.0, 1.0, 0.0),
-    ) -> list[Route | None]: ...
+    ) -> list[Route | None]:
+        """The routes of many pairs, `starts` and `goals` (n, 3), on all cores: a list with a `Route` for each, and
+        None where there is none, of which an `InputWarning` says why. Otherwise as `route`."""
 
 _BodyOrder: TypeAlias = Literal["depth-first", "breadth-first"]
 _Siblings: TypeAlias = Literal["file", "body-name", "joint-name"]
@@ -1762,21 +1998,30 @@ _VelocityPoint: TypeAlias = Literal["origin", "mass"]
 
 @final
 class Robot:
+    """A robot: its bodies (links) and joints, from an MJCF or URDF file."""
     @classmethod
-    def load(cls, path: _Path) -> Robot: ...
+    def load(cls, path: _Path) -> Robot:
+        """Reads a robot from an MJCF or URDF file."""
     @property
-    def name(self) -> str: ...
+    def name(self) -> str:
+        """Its name; empty if the file has none."""
     @property
-    def joint_names(self) -> list[str]: ...
+    def joint_names(self) -> list[str]:
+        """The hinges and slides that have a value, in the order of `joint_pos`."""
     @property
-    def root_names(self) -> list[str]: ...
+    def root_names(self) -> list[str]:
+        """The free joints, in the order of `root_pos` and `root_quat`."""
     @property
-    def ball_names(self) -> list[str]: ...
+    def ball_names(self) -> list[str]:
+        """The ball joints, in the order of `ball_quat`."""
     @property
-    def limits(self) -> _Double: ...
+    def limits(self) -> _Double:
+        """The smallest and the largest value of each joint of `joint_names`, float64 (joints, 2); infinite without limits."""
     def body_names(
         self, body_order: _BodyOrder = "depth-first", *, siblings: _Siblings = "file"
-    ) -> list[str]: ...
+    ) -> list[str]:
+        """The names of the bodies, "depth-first" (mjlab) or "breadth-first" (Isaac); `siblings`: bodies with the
+        same parent as in the "file", or by "body-name" or "joint-name"."""
     def forward(
         self,
         joint_pos: _Array,
@@ -1792,31 +2037,43 @@ class Robot:
         body_order: _BodyOrder = "depth-first",
         siblings: _Siblings = "file",
         velocity_at: _VelocityPoint = "origin",
-    ) -> dict[str, _Double]: ...
+    ) -> dict[str, _Double]:
+        """The bodies of configurations, by forward kinematics in float64."""
 
 @final
 class Route:
+    """A route over a surface: straight from each point to the next."""
     def __eq__(self, other: object, /) -> bool: ...
     __hash__: ClassVar[None]  # type: ignore[assignment]
     @property
-    def points(self) -> _Double: ...
+    def points(self) -> _Double:
+        """The points from the start to the goal, (n, 3), float64, connected by straight lines; a single point if start and
+        goal are the same."""
     @property
-    def normals(self) -> _Double | None: ...
+    def normals(self) -> _Double | None:
+        """The unit normal of the surface at each point, (n, 3), 0 where those of its faces cancel out; None
+        where the surface has one side."""
     @property
-    def length(self) -> float: ...
+    def length(self) -> float:
+        """The length over the surface."""
     @property
-    def off(self) -> tuple[float, float]: ...
+    def off(self) -> tuple[float, float]:
+        """How far start and goal were from the surface."""
 
 @final
 class Walk:
+    """The positions of a walker at times: straight from each point to the next."""
     def __eq__(self, other: object, /) -> bool: ...
     __hash__: ClassVar[None]  # type: ignore[assignment]
     @property
-    def times(self) -> _Double: ...
+    def times(self) -> _Double:
+        """When it is at each point in seconds, (n,). Two with the same point are a wait between them."""
     @property
-    def points(self) -> _Double: ...
+    def points(self) -> _Double:
+        """Where it is, (n, 3), float64."""
     @property
-    def normals(self) -> _Double | None: ...
+    def normals(self) -> _Double | None:
+        """The unit normal of the surface at each point, (n, 3); None where it has one side."""
 
 def walk(
     routes: Sequence[Route],
@@ -1825,4 +2082,7 @@ def walk(
     radius: ArrayLike,
     start: ArrayLike = 0.0,
     movers: Sequence[tuple[ArrayLike, ArrayLike, float]] = (),
-) -> list[Walk | None]: ...
+) -> list[Walk | None]:
+    """Plans walkers on routes, one after another. Each waits on its route where this is necessary, for moving obstacles
+    and for the walkers before it. Returns a list with a `Walk` for each, or None for a walker that cannot pass, with
+    an `InputWarning` that says why."""

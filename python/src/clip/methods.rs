@@ -167,7 +167,7 @@ impl Clip {
         fraction.call1((rate.to_string(),)).map(Some)
     }
 
-    /// The first and the last key time, seconds.
+    /// The first and the last key time in seconds.
     #[getter]
     fn span(&self) -> (f64, f64) {
         self.motion.set.time_span().unwrap_or((0.0, 0.0))
@@ -258,7 +258,7 @@ impl Clip {
         )
     }
 
-    /// The key times of a track, by its index or name: (keys,), float64, seconds.
+    /// The key times of a track, by its index or name: (keys,), float64 in seconds.
     ///
     /// >>> import tumble
     /// >>> clip = tumble.Clip([0.0, 0.5], [[0, 0, 0, 1], [1, 0, 0, 0]], names=["hip"])
@@ -296,8 +296,8 @@ impl Clip {
         PyArray1::from_vec(py, numbers).reshape([count, 4])
     }
 
-    /// The scalars, such as the angles of a robot's joints, by their names: the times of their keys (keys,), seconds, and
-    /// their values (keys,), float32 (float64 where whole turns were taken off an angle).
+    /// The scalars, such as the angles of a robot's joints, by their names: the times of their keys in seconds (keys,),
+    /// and their values (keys,), float32 (float64 where whole turns were taken off an angle).
     ///
     /// >>> import tumble
     /// >>> clip = tumble.Clip([0.0], [[0, 0, 0, 1]], scalars={"knee": ([0.0, 1.0], [0.5, 0.25])})
@@ -325,7 +325,7 @@ impl Clip {
         Ok(all)
     }
 
-    /// The translation keys of a track, by its index or name: their times (keys,), seconds, and
+    /// The translation keys of a track, by its index or name: their times (keys,) in seconds, and
     /// their values (keys, 3), float32 (float64 where the track has one of the `origins`), in the file's
     /// units; None for a track without.
     fn translations<'py>(
@@ -402,9 +402,9 @@ impl Clip {
         Ok(found.without_document())
     }
 
-    /// The part of the clip from `start` to `end`, seconds; without one of the two, from its first key or to its last. Keys
-    /// keep their times and bits. A channel without a key at a cut gets one there, of its curve. Steps, lines and arcs
-    /// stay the same; smooth curves change in the intervals next to the cuts.
+    /// The part of the clip from `start` to `end` (in seconds); without `start` from its first key, without `end` to
+    /// its last. Keys keep their times and bits. A channel without a key at a cut gets one there, of its curve. Steps,
+    /// lines and arcs stay the same; smooth curves change in the intervals next to the cuts.
     ///
     /// >>> import tumble
     /// >>> clip = tumble.Clip([0.0, 1.0, 2.0], [[0, 0, 0, 1], [1, 0, 0, 0], [0, 1, 0, 0]])
@@ -429,8 +429,8 @@ impl Clip {
         Ok(self.with_keys(part))
     }
 
-    /// The clip `speed` times as fast, with its first key at `start`, seconds; without it, where it is. Keys keep their
-    /// bits; velocities and tangents are multiplied by the speed.
+    /// Returns the clip, played `speed` times as fast. The first key is moved to `start` (in seconds); without `start`,
+    /// the key stays at its time. Keys keep their bits; velocities and tangents are multiplied by the speed.
     ///
     /// >>> import tumble
     /// >>> clip = tumble.Clip([0.0, 1.0], [[0, 0, 0, 1], [1, 0, 0, 0]])
@@ -559,10 +559,11 @@ impl Clip {
         Sampler::of(slf, options)
     }
 
-    /// Draws the components of a track over time, its keys as dots, with matplotlib; gives its axes.
+    /// Draws the components of a track over time, with its keys as dots, with matplotlib; returns the axes of
+    /// matplotlib.
     ///
-    /// `plot(track=0, *, fps=120, axes=None, …)`: `track` is an index or a name, `axes` those
-    /// of matplotlib to draw on, the other options are those of `evaluate`.
+    /// `track` is an index or a name, by default the first track; `fps` is 120 by default; `axes` are those of
+    /// matplotlib to draw on. The other options are those of `evaluate`.
     ///
     /// >>> import tumble
     /// >>> clip = tumble.Clip([0.0, 2.0], [[0, 0, 0, 1], [1, 0, 0, 0]])
@@ -583,8 +584,7 @@ impl Clip {
     /// value of a notebook's cell is shown in its output; `save(path)` writes the page, `html` is
     /// its text.
     ///
-    /// `view(*, methods=None, fps=60, start=None, end=None, height=520)`: the `methods` to choose
-    /// from, names or "all"; `height` is that of the output, pixels.
+    /// `methods`: the names of the methods to choose from, or "all". `height`: the height of the output in pixels.
     ///
     /// >>> import tumble
     /// >>> clip = tumble.Clip([0.0, 2.0], [[0, 0, 0, 1], [1, 0, 0, 0]])

@@ -135,11 +135,8 @@ impl Engine {
     /// The rotation of every track at every sample, written by the engine into NumPy's memory:
     /// float32, (tracks, frames, 4), unit quaternions.
     ///
-    /// `evaluate(clip, *, fps=None, at=None, out=None, order="xyzw", layout="track",
-    /// as_rotation=False, dtype="float32", device_array=False, …)`
-    ///
     /// Which samples: `fps`, a rate (use "30000/1001", not 29.97), with `start` and
-    /// `end`, seconds, else from the first key to the last; or `at` (or `times`), seconds, in any
+    /// `end` in seconds, else from the first key to the last; or `at` (or `times`) in seconds, in any
     /// order: one list for all tracks, (tracks, frames), or a list with an array for each track. A
     /// single time gives a result without the axis of frames; lists of different lengths give a
     /// list of arrays.
@@ -191,13 +188,10 @@ impl Engine {
     /// files, `joint_pos` and `joint_vel` (frames, joints), `body_pos_w` (frames, bodies, 3), `body_quat_w` (…, 4),
     /// `body_lin_vel_w` and `body_ang_vel_w` (…, 3), in the world.
     ///
-    /// `bodies(robot, joint_pos, root_pos=None, root_quat=None, *, order, source_fps=None, source_times=None,
-    /// joint_names=None, body_order="depth-first", siblings="file", velocity_at="origin", …)`
-    ///
-    /// `joint_pos`: (keys, joints), for `joint_names`, by default those of the robot. `root_pos`, `root_quat`: (keys, 3)
-    /// and (keys, 4), the pose of the free joint. Keys are at `source_fps`, or at `source_times`, seconds. `order`: "wxyz"
-    /// or "xyzw", of keys and results; it has no default, because files differ. `body_order`, `siblings` and
-    /// `velocity_at` are those of `Robot.forward`. Samples and `method` are those of `evaluate`.
+    /// `joint_pos`: (keys, joints), for `joint_names`, by default those of the robot. `root_pos`, `root_quat`: (keys,
+    /// 3) and (keys, 4), the pose of the free joint. Keys are at `source_fps`, or at `source_times` in seconds.
+    /// `order`: "wxyz" or "xyzw", of keys and results; it has no default, because files differ. `body_order`,
+    /// `siblings` and `velocity_at` are those of `Robot.forward`. Samples and `method` are those of `evaluate`.
     ///
     /// Joints are interpolated, and bodies follow from them. Velocities are derivatives of the curves. Angles of
     /// hinges without limits are unwrapped first. Joints without keys stay where the file has them, and joints that
@@ -274,7 +268,7 @@ impl Engine {
         )
     }
 
-    /// The angular velocity of every track at every sample: float32, (tracks, frames, 3), rad/s,
+    /// The angular velocity of every track at every sample: float32, (tracks, frames, 3) in rad/s,
     /// about the axes of the "body" or of its "parent", or in the "world": that of the rotation in the world,
     /// along the skeleton, about the world's axes. Of a track without a parent the last two are the same. Other
     /// keywords are those of `evaluate`.
@@ -300,7 +294,7 @@ impl Engine {
         self.result(clip, &result, out, options)
     }
 
-    /// The angular acceleration, rad/s²; otherwise as `velocity`.
+    /// The angular acceleration in rad/s²; otherwise as `velocity`.
     ///
     /// >>> import tumble
     /// >>> clip = tumble.Clip([0.0, 2.0], [[0, 0, 0, 1], [0, 0, 1, 0]])
@@ -434,7 +428,7 @@ impl Engine {
     /// "euler" … (`tumble.encodings()`), an array (tracks, frames, …). Every device gives the same bits.
     ///
     /// `major`: "row" or "column", the order of matrices. `sequence`: the axes of Euler angles. `degrees=False`: angles
-    /// in radians. `device_array`: as of `evaluate`, whose keywords the others are.
+    /// in radians. `device_array` and the other keywords are those of `evaluate`.
     ///
     /// >>> import tumble
     /// >>> clip = tumble.Clip([0.0, 2.0], [[0, 0, 0, 1], [0, 0, 1, 0]])
@@ -514,15 +508,13 @@ impl Engine {
 
     /// Smooths samples. Returns a float32 array of the same shape, or a clip if `samples` is a `Clip`.
     ///
-    /// `smooth(samples, *, kernel="gaussian:2", low_pass=None, fps=None, passes=1, ends="keep",
-    /// layout="track", order="xyzw", out=None)`
-    ///
     /// `samples`: evenly spaced rotations (frames, 4) or (tracks, frames, 4), or vectors with 3 components; with
-    /// `layout="frame"` (frames, tracks, …). Kernels act on the steps from sample to sample, so that constant samples keep
-    /// their bits and uniform motion is unchanged. `kernel`: "linear", "cubic", "box:S" and "tent:S" (S samples to either
-    /// side), "gaussian:S" (standard deviation) or "savitzky-golay:RADIUS:ORDER". `low_pass`: a frequency in Hz, with
-    /// `fps`, the rate of the samples. The kernel is the Gaussian that halves the power of motion at this frequency.
-    /// `ends`: "keep", "parabolic" (of "cubic") or "loop" (the last repeats the first).
+    /// `layout="frame"` (frames, tracks, …). Kernels act on the steps from sample to sample, so that constant samples
+    /// keep their bits and uniform motion is unchanged. `kernel`: "linear", "cubic", "box:S" and "tent:S" (S samples to
+    /// either side), "gaussian:S" (standard deviation; the default is "gaussian:2") or "savitzky-golay:RADIUS:ORDER".
+    /// `low_pass`: a frequency in Hz, with `fps`, the rate of the samples. The kernel is the Gaussian that halves the
+    /// power of motion at this frequency. `ends`: "keep", "parabolic" (of "cubic") or "loop" (the last repeats the
+    /// first).
     ///
     /// A `Clip` keeps its names, its skeleton, scales and steps; its rotations and translations are smoothed, at its keys
     /// or, where these are not even, at the frames of `fps`. If it is saved in the format of its file, all other content of
@@ -572,8 +564,6 @@ impl Engine {
     /// the sign that is nearer to the first one's. Weights need not add up to 1. Arrays have no names, so tracks are
     /// combined by index: bring those of clips into one order by `Clip.names` first.
     ///
-    /// `blend(layers, weights=None, *, order="xyzw", out=None)`
-    ///
     /// `layers`: a list of arrays (…, 4) of one shape, which is that of the result; `weights`: a number for each,
     /// by default 1.
     ///
@@ -612,8 +602,6 @@ impl Engine {
 
     /// A layer of rotations added to a base: `base · (reference⁻¹ layer)^weight`.
     ///
-    /// `add(base, layer, *, reference=None, weight=1.0, layout="track", order="xyzw", out=None)`
-    ///
     /// `base` and `layer`: (frames, 4), (tracks, frames, 4), or as `layout` says. `reference`: a rotation for each track,
     /// (tracks, 4), or one, (4,); without it, the layer itself is added. `weight`: 0 to 1. Tracks are combined by index, as
     /// in `blend`.
@@ -641,9 +629,6 @@ impl Engine {
     /// The matrices of a skeleton's joints in the model, from its roots down: `M = M_parent T R S`, and `M B`
     /// with inverse bind matrices `B`, as vertices are skinned with. float32, (tracks, frames, 3, 4), for column
     /// vectors, the last column the translation; a view.
-    ///
-    /// `local_to_model(rotations, parents, offsets=None, *, translations=None, scales=None, inverse_bind=None,
-    /// layout="track", order="xyzw")`
     ///
     /// `rotations`: (tracks, frames, 4), or of one pose (tracks, 4). `parents`: the index of each track's
     /// parent, None or -1 for a root. `offsets`: (tracks, 3). `translations` replace them: like the
@@ -686,18 +671,15 @@ impl Engine {
 
     /// Bodies on paths: the position of each at every sample, and the rotation from its axes to the world's.
     ///
-    /// `follow(times, points, *, fps=None, at=None, start=None, end=None, duration=None, rate=None, ups=None,
-    /// method="bessel-overhauser", ends="parabolic", ahead=None, look_at=None, frame="minimal",
-    /// up=(0, 1, 0), twist="spread", speed="keys", forward="z", upward="y", layout="track", order="xyzw")`
-    ///
-    /// `points`: (points, 3), (tracks, points, 3), or a list with an array for each track; `times`: seconds
-    /// of the points, or None with `duration`, seconds, or `rate`, the distance covered in a second. `ups`: upward
-    /// directions at the points, like them. `method`: the curve through the points. `ahead`: the body faces
-    /// the point this far ahead instead of along the path; `look_at`: a point or a track's index that it
-    /// faces. `frame`: how it is rotated about its direction, "minimal", "fixed" or "frenet", with `up` at the
-    /// start or everywhere. `twist`: whether the rotation that remains after a closed path (`ends="loop"`) is spread
-    /// ("spread") or stays ("free"). `speed`: "keys", "constant", or the parts of the time over which it grows
-    /// and falls. `forward` and `upward`: axes of the body, such as "-x".
+    /// `points`: (points, 3), (tracks, points, 3), or a list with an array for each track; `times`: seconds of the
+    /// points, or None with `duration` in seconds, or `rate`, the distance covered in a second. `ups`: upward
+    /// directions at the points, like them. `method`: the curve through the points. `ahead`: the body faces the point
+    /// this far ahead instead of along the path; `look_at`: a point or a track's index that it faces. `frame`: how it
+    /// is rotated about its direction, "minimal", "fixed" or "frenet", with `up` at the start or everywhere. `twist`:
+    /// whether the rotation that remains after a closed path (`ends="loop"`) is spread ("spread") or stays ("free").
+    /// `speed`: "keys" or "as-keyed" (the default: the key times), "constant", or a pair of fractions of the duration:
+    /// over the first one the speed grows from 0, over the second one it falls to 0. `forward` and `upward`: axes of
+    /// the body, such as "-x".
     ///
     /// Gives positions (tracks, frames, 3), float32 (float64 far from 0), and rotations (tracks, frames, 4).
     ///

@@ -98,8 +98,9 @@ impl Net {
     /// Makes a net of `rows` × `columns` control points, row by row.
     ///
     /// # Errors
-    /// When a side has fewer than 2 or more than [`MAX_POINTS`] points, when the number of points is not `rows` times
-    /// `columns`, or when a coordinate is not finite or exceeds 1e75.
+    /// * When a side has fewer than 2 or more than [`MAX_POINTS`] points.
+    /// * When the number of points is not `rows` times `columns`.
+    /// * When a coordinate is not finite or exceeds 1e75 in magnitude.
     pub fn new(rows: usize, columns: usize, points: Vec<DVec3>) -> Result<Self, NetError> {
         let sides = 2..=MAX_POINTS;
         if !sides.contains(&rows) || !sides.contains(&columns) {

@@ -36,7 +36,7 @@ pub(crate) struct CpuEngine {
     /// The engine's threads; `None`: the process's threads.
     pub(crate) private_threads: Option<Threads>,
     pub(crate) scratch_pool: ScratchPool,
-    /// The limit of the segments of a clip, bytes, if there is one.
+    /// The limit of the segments of a clip in bytes, if there is one.
     pub(crate) memory: Option<usize>,
     /// Bytes of segments that a clip keeps although its samples can be computed from its keys.
     pub(crate) kept_segments: usize,

@@ -24,9 +24,11 @@ impl Crowd {
     /// more, more instances may be visible later.
     ///
     /// # Errors
-    /// When the engine was not made by `from_vulkan`, the buffer is null, the range does not start at a multiple of 256
-    /// bytes, is too short or ends beyond the buffer, skinning matrices are requested but the library has no inverse
-    /// bind matrices, or the device fails.
+    /// * When the engine was not made by [`Engine::from_vulkan`](crate::Engine::from_vulkan).
+    /// * When the buffer is null, or the range does not start at a multiple of 256 bytes, is too short, or ends beyond
+    ///   the buffer.
+    /// * When skinning matrices are requested, and the library has no inverse bind matrices.
+    /// * When the device fails.
     ///
     /// # Safety
     /// The buffer must belong to the engine's device, be bound to memory, have the usage `STORAGE_BUFFER`, contain
@@ -87,15 +89,15 @@ impl Crowd {
         unsafe { self.record_between(target, commands, CommandScopes::default()) }
     }
 
-    /// As [`Crowd::record`], with barriers for some users of the result's memory alone. Earlier evaluations of the crowd
-    /// are waited for in any case.
+    /// As [`Crowd::record`], but the barriers order the evaluation only with the commands that `scopes` names: compute
+    /// shaders, copies or the host. Earlier evaluations of the crowd are always waited for.
     ///
     /// # Errors
     /// As for [`Crowd::record`].
     ///
     /// # Safety
-    /// As for [`Crowd::record`]; and the application has its own barriers for other commands that use the result's
-    /// memory.
+    /// As for [`Crowd::record`]. In addition, the application must have its own barriers for all other commands that
+    /// use the result's memory.
     pub unsafe fn record_between(
         &mut self,
         target: &CrowdTarget,

@@ -10,10 +10,10 @@ impl Crowd {
     /// The events that the layers of all instances passed after the time `since` of the clock, up to its current time:
     /// in the order of the times at which they were passed, then of instances, layers and events.
     ///
-    /// A layer passes an event when its time in the clip reaches the event's tick, in either direction, and in a loop once in
-    /// each round. Times are whole ticks, so that one large step passes the same events as many small ones. What counts is the
-    /// clips that the layers play now: call it after the clock moved, and before layers are set to other clips.
-    /// Layers with weight 0 pass events, too; look at [`PassedEvent::weight`].
+    /// A layer passes an event when its time in the clip reaches the event's tick, in either direction, and in a loop
+    /// once in each round. Times are whole ticks, so that one large step passes the same events as many small ones. The
+    /// clips that the layers play now count, so call this function after the clock was moved and before layers get
+    /// other clips. Layers with weight 0 pass events, too; look at [`PassedEvent::weight`].
     ///
     /// ```
     /// use tumble::crowd::{CrowdLayer, CrowdLibrary};

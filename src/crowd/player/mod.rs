@@ -22,7 +22,7 @@ use crate::twin::crowd_entries::gather;
 use crate::twin::crowd_layers::Layers;
 use crate::twin::crowd_matrices::to_any_half;
 
-/// The clock's limit, ticks: below it, f64 represents all whole numbers.
+/// The clock's limit in ticks: below it, f64 represents all whole numbers.
 const FARTHEST: f64 = (1u64 << 52) as f64;
 
 /// Many instances of a library's skeleton, each of which plays clips at its time and speed.
@@ -239,9 +239,10 @@ impl Crowd {
     /// The result is `[instance][joint]`: a rotation, or the three rows of a matrix.
     ///
     /// # Errors
-    /// When `output` is not exactly as long as the result ([`Crowd::output_len`]), skinning matrices are requested
-    /// but the library has no inverse bind matrices, the result of [`Crowd::submit`] was not taken yet, or the device
-    /// fails.
+    /// * When `output` is not exactly as long as the result ([`Crowd::output_len`]).
+    /// * When skinning matrices are requested, and the library has no inverse bind matrices.
+    /// * When the result of [`Crowd::submit`] was not taken yet.
+    /// * When the device fails.
     pub fn evaluate_into(
         &mut self,
         values: CrowdValues,
@@ -426,13 +427,13 @@ impl Crowd {
         Ok(on_cpu::evaluate(scene, &*self.engine.machine, output)?)
     }
 
-    /// The clock's time, ticks.
+    /// The clock's time in ticks.
     #[must_use]
     pub fn clock(&self) -> u64 {
         self.instances.clock
     }
 
-    /// Sets the clock's time, ticks, forwards or backwards. All instances follow.
+    /// Sets the clock's time in ticks, forwards or backwards. All instances follow.
     ///
     /// # Errors
     /// When `ticks` is 2^52 or more, two centuries at 705 600 ticks a second.
@@ -455,9 +456,9 @@ impl Crowd {
         self.set_clock(self.clock().saturating_add(ticks))
     }
 
-    /// Moves the clock forward by `seconds`, rounded to ticks. The rounding errors of many steps add up: if the clock
-    /// must follow frames exactly, as in a film at 30000/1001 frames a second, use [`Crowd::set_clock`] with each
-    /// frame's time.
+    /// Moves the clock forward by `seconds`, rounded to ticks. If steps are no whole numbers of ticks, the rounding
+    /// errors of many steps add up: if the clock must follow frames exactly, as in a film at 30000/1001 frames a
+    /// second, use [`Crowd::set_clock`] with each frame's time.
     ///
     /// # Errors
     /// When `seconds` is negative or NaN, and as [`Crowd::set_clock`].

@@ -1,4 +1,4 @@
-//! A clip: a set prepared for its interpolation, or one for each track, stored on a device, for evaluation at any times.
+//! A clip: a set that is prepared for one interpolation, or for an interpolation of each track, and stored on a device.
 
 pub(crate) mod request;
 pub(crate) mod sampler;
@@ -88,9 +88,9 @@ impl Clip {
     ///
     /// By default a clip keeps a segment for each key: 64 bytes for an arc, and 144, 176 or 208 for a polynomial. The
     /// smaller the rotation between two keys, the fewer coefficients of Catmull-Rom, Bessel-Overhauser, Hermite and
-    /// B-spline curves the CPU keeps; nearly all of their segments of recorded motion take 144 bytes. Other methods mostly
-    /// need all coefficients, and devices keep all. On the CPU a clip keeps its keys instead (16 bytes each;
-    /// tracks with the same times share them) if its segments would take more memory than
+    /// B-spline curves the CPU keeps; nearly all of their segments of recorded motion take 144 bytes. Other methods
+    /// mostly need all coefficients, and devices keep all. On the CPU a clip keeps its keys instead (16 bytes each, and
+    /// the key times, which tracks with the same times share) if its segments would take more memory than
     /// [`EngineOptions::kept_segments`](crate::EngineOptions::kept_segments) or than the engine may use, and if samples
     /// can be computed from the keys: for arcs, and for cubics that mostly rotate little between keys. Both limits are
     /// compared with 208 bytes for each polynomial, because its coefficients are not known before.
@@ -103,35 +103,36 @@ impl Clip {
         bytes as f64 / self.keys.max(1) as f64
     }
 
-    /// The sample times of `frames` for this clip.
+    /// Computes the sample times for this clip: for frames, from its first key to its last.
     ///
     /// # Errors
-    /// When the frames do not fit the clip.
-    pub fn timeline(&self, frames: &SampleTimes) -> Result<Timeline, SampleTimesError> {
+    /// As [`SampleTimes::resolve`].
+    pub fn timeline(&self, times: &SampleTimes) -> Result<Timeline, SampleTimesError> {
         let span = match &self.tracks {
             ClipTracks::Alike(uploaded) => uploaded.data().time_span,
             ClipTracks::Grouped(grouped) => grouped.time_span,
         };
-        frames.resolve(self.track_count(), span)
+        times.resolve(self.track_count(), span)
     }
 
     /// Evaluates the rotation of every track at every sample, `[track][frame]`. Short for
-    /// [`request`](Clip::request)`(frames).`[`evaluate`](Request::evaluate)`()`.
+    /// [`request`](Clip::request)`(times).`[`evaluate`](Request::evaluate)`()`.
     ///
     /// # Errors
-    /// When the frames do not fit the clip, the clip is of velocities or accelerations, there is not enough memory
-    /// for the result, or the device fails.
-    pub fn evaluate(&self, frames: &SampleTimes) -> Result<Rotations, Error> {
-        self.request(frames).evaluate()
+    /// * [`Error::SampleTimes`] when the sample times do not fit the clip ([`SampleTimes::resolve`]).
+    /// * When the clip is of velocities or accelerations, which [`Clip::rates`] evaluates.
+    /// * When there is not enough memory for the result, or the device fails.
+    pub fn evaluate(&self, times: &SampleTimes) -> Result<Rotations, Error> {
+        self.request(times).evaluate()
     }
 
     /// Evaluates the vectors of a clip of angular velocities or accelerations. Short for
-    /// [`request`](Clip::request)`(frames).`[`layout`](Request::layout)`(layout).`[`rates`](Request::rates)`()`.
+    /// [`request`](Clip::request)`(times).`[`layout`](Request::layout)`(layout).`[`rates`](Request::rates)`()`.
     ///
     /// # Errors
     /// As [`Clip::evaluate`], but the clip must not be of rotations.
-    pub fn rates(&self, frames: &SampleTimes, layout: Layout) -> Result<Vectors, Error> {
-        self.request(frames).layout(layout).rates()
+    pub fn rates(&self, times: &SampleTimes, layout: Layout) -> Result<Vectors, Error> {
+        self.request(times).layout(layout).rates()
     }
 
     pub(crate) fn quantity(&self) -> Quantity {
@@ -155,7 +156,7 @@ impl Clip {
     }
 
     /// Evaluates into memory of the result's type, as [`Engine::evaluate_into`]. Short for
-    /// [`request`](Clip::request)`(frames).`[`layout`](Request::layout)`(layout).`[`evaluate_into`](Request::evaluate_into)`(output)`,
+    /// [`request`](Clip::request)`(times).`[`layout`](Request::layout)`(layout).`[`evaluate_into`](Request::evaluate_into)`(output)`,
     /// which accepts memory of any type.
     ///
     /// # Errors
@@ -163,11 +164,11 @@ impl Clip {
     /// type does not fit the quantity.
     pub fn evaluate_into<R: OutputValue>(
         &self,
-        frames: &SampleTimes,
+        times: &SampleTimes,
         layout: Layout,
         output: &mut [R],
     ) -> Result<(), Error> {
-        self.request(frames)
+        self.request(times)
             .layout(layout)
             .evaluate_values_into(output)
     }
@@ -194,19 +195,18 @@ impl Clip {
             .evaluate_into(&timeline, window, output)?)
     }
 
-    /// Starts a request for the samples at the times of `frames`: by default of all tracks, track by track, with four
-    /// f32 a value.
-    pub fn request<'a>(&'a self, frames: &'a SampleTimes) -> Request<'a> {
-        Request::of_clip(self, frames)
+    /// Starts a request for the samples at these times: by default of all tracks, track by track, with four f32 per
+    /// value.
+    pub fn request<'a>(&'a self, times: &'a SampleTimes) -> Request<'a> {
+        Request::of_clip(self, times)
     }
 
-    /// Prepares the evaluation of single samples and poses on the calling thread, with the bits of
-    /// [`Clip::evaluate`] at listed times. The clip of a Vulkan device is evaluated from the segments that the host
-    /// has, too.
+    /// Prepares the evaluation of single samples and poses on the calling thread, with the bits of [`Clip::evaluate`]
+    /// at listed times. A clip on a Vulkan device is sampled on the host too, which keeps its segments.
     ///
     /// # Errors
-    /// When the segments of the clip exceed the engine's memory limit, so that they are not kept, and samples cannot be
-    /// computed from its keys within the limit.
+    /// When the segments of the clip exceed the engine's memory limit, and samples cannot be computed from the keys of
+    /// the clip within the limit.
     pub fn sampler(&self) -> Result<Sampler, Error> {
         let (clips, tracks) = match &self.tracks {
             ClipTracks::Alike(uploaded) => {

@@ -39,9 +39,9 @@ use crate::twin::evaluate_arc::{norm_squared, on_arc};
 /// ([`Clip::sampler`](crate::Clip::sampler)).
 ///
 /// Every value has the bits that the clip's evaluation at [listed times](crate::SampleTimes::at) has. Times may be in
-/// any order; it is fastest if most are near the one before. Nothing is allocated after the sampler was made. A clone
-/// is independent of it, for another thread or another playback of the same clip; both share the prepared tracks, also
-/// after the clip was dropped.
+/// any order; sampling is fastest if most times are near the time before. Nothing is allocated after the sampler was
+/// made. A clone is independent, for another thread or another playback of the same clip. Clones share the prepared
+/// tracks, also after the clip was dropped.
 ///
 /// ```
 /// use glam::Quat;
@@ -265,7 +265,7 @@ impl Sampler {
         self.clip.bytes_per_key
     }
 
-    /// The rotation of a track at a time, seconds.
+    /// The rotation of a track at `time`, which is in seconds.
     ///
     /// # Errors
     /// When there is no such track, the time is not finite, or the clip is of velocities or accelerations, which
@@ -279,7 +279,8 @@ impl Sampler {
         Ok(Quat::from_array(value))
     }
 
-    /// The value of every track at a time, seconds, into `output`, which has an element for each track.
+    /// Stores the value of every track at `time`, which is in seconds, in `output`, which has an element for each
+    /// track.
     ///
     /// # Errors
     /// When the time is not finite, `output` is not exactly as long as there are tracks, or its type does not fit the
@@ -289,7 +290,8 @@ impl Sampler {
         self.fill(None, time, bytemuck::cast_slice_mut(output))
     }
 
-    /// The values of some tracks at a time, seconds, into `output`, which has an element for each of `tracks`.
+    /// Stores the values of some tracks at `time`, which is in seconds, in `output`, which has an element for each of
+    /// `tracks`.
     ///
     /// # Errors
     /// As [`Sampler::pose`]; also when there is no such track. Then nothing is written.

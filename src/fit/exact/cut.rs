@@ -26,7 +26,7 @@ pub(crate) struct Subcurve {
     pub(crate) span: usize,
     /// The curve's index in [`Cutter::curves`].
     curve: usize,
-    /// The start and the length of its interval, seconds.
+    /// The start and the length of its interval in seconds.
     interval: (f64, f64),
     pub(crate) piece: CurvePiece,
     /// Its index among the segments, chosen when it is fitted; `None` after that if it is one of the finest pieces
@@ -89,7 +89,7 @@ impl Cutter {
         segments: &mut Vec<PolynomialSegment>,
     ) {
         let mut done = 0;
-        // If the work was stopped, the caller finds this out itself.
+        // If the work was stopped, the caller notices it after this function has returned.
         while done < self.waiting.len() && !stop::is_stopped() {
             let new = || Box::new(FitBlock::new(shape, quantity, Tier::Piece));
             let block = self.block.get_or_insert_with(new);

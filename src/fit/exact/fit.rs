@@ -102,7 +102,7 @@ impl CurvePiece {
         cuts: 0,
     };
 
-    /// The time at which it begins in an interval that starts at `start` and takes `duration`, seconds.
+    /// The time in seconds at which it begins in an interval that starts at `start` and takes `duration`.
     pub(crate) fn begins(self, start: f64, duration: f64) -> f64 {
         start + duration * self.from
     }

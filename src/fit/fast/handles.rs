@@ -152,7 +152,7 @@ impl FindCurves<'_> {
             let to_start = L::all(THIRD) - to_end;
             store(&mut lanes.incoming, key, scaled(tangent, to_start));
             store(&mut lanes.outgoing, key, scaled(tangent, to_end));
-            // 2/3 of `KEY_UNKNOWN` is 4/3, which exceeds the limit of 1.
+            // 2/3 of `KEY_UNKNOWN` is 4/3, which exceeds the limit of 1, so the intervals at such a key are in doubt.
             let kind = kind * L::all(2.0 / 3.0);
             let parts = square(left).larger(square(right).larger(square(sum(left, right))));
             let limit_ratio = parts * L::all(1.0 / LONGEST_TANGENT_PART);

@@ -22,7 +22,7 @@ pub(crate) trait Moving: Fn(Dual) -> [Dual; 4] {}
 
 impl<F: Fn(Dual) -> [Dual; 4]> Moving for F {}
 
-/// The angle that a curve has covered at each eighth of its parameter, radians.
+/// The angle in radians that a curve has covered at each eighth of its parameter.
 #[derive(Debug)]
 pub(crate) struct ArcLengths {
     lengths: [f64; PARTS + 1],
@@ -49,7 +49,7 @@ impl ArcLengths {
         self.ends = ends;
     }
 
-    /// The angle of the whole curve, radians.
+    /// The angle of the whole curve in radians.
     pub(crate) fn total(&self) -> f64 {
         self.lengths[PARTS]
     }
@@ -119,7 +119,7 @@ impl ArcLengths {
     }
 }
 
-/// The arc length between two parameters, radians.
+/// The arc length in radians between two parameters.
 fn arc_length_between(curve: &impl Moving, from: f64, to: f64) -> f64 {
     let differ = |whole: f64, sum: f64| {
         let agree = (sum - whole).abs() <= 1e-13 * (1.0 + sum);

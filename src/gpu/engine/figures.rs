@@ -95,7 +95,7 @@ impl VulkanEngine {
     }
 }
 
-/// Rates at which a device writes its memory, bytes per second: medians of several runs, by the device's clock.
+/// Rates at which a device writes its memory in bytes per second: medians of several runs, by the device's clock.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct WriteRates {
     /// The rate of the kernel that the engine uses on the device, for one constant. On cards, neighbouring
@@ -224,7 +224,7 @@ impl VulkanEngine {
         work.bind(|kernel| self.pipeline(kernel))
     }
 
-    /// The rate of recorded commands, bytes per second: the median of some runs.
+    /// The rate of recorded commands in bytes per second: the median of some runs.
     fn rate(
         &self,
         bytes: u64,

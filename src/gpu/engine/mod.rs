@@ -83,7 +83,7 @@ pub(crate) struct VulkanEngine {
     pub(crate) window: AtomicUsize,
     /// Bytes that the segments of one buffer may take.
     pub(crate) group_bytes: usize,
-    /// The memory budget, bytes.
+    /// The memory budget in bytes.
     pub(crate) budget: Option<u64>,
     /// Whether kernels that differ from the CPU are used nevertheless.
     allow_inexact: bool,

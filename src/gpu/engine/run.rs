@@ -21,7 +21,7 @@ use crate::threads::exclusive::Exclusive;
 use crate::threads::{lock, on_threads, stop};
 use crate::work::lists::Stored;
 
-/// The maximum size of the lines in which a card's memory is written, bytes.
+/// The maximum size in bytes of the lines in which a card's memory is written.
 const LINE_BYTES: u64 = 128;
 
 /// The largest aligned offset that is a whole number of rotations before the start of a window, for a binding.

@@ -333,7 +333,7 @@ fn scattered(random: &mut Random) -> Trial {
         .filter(|_| random.once_in(3))
         .map(|(entry, index)| change(index, &entry))
         .collect();
-    // The last change is not counted.
+    // The count leaves out the last change, so that a kernel that ignores the count is found.
     let count = changes.len() - 1;
     let dispatch = CrowdDispatch {
         count: count as u32,

@@ -33,7 +33,7 @@ pub struct DeviceDetails {
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
 #[non_exhaustive]
 pub struct MemoryHeap {
-    /// The size, bytes.
+    /// The size in bytes.
     pub bytes: u64,
     /// Whether the heap is device-local.
     pub is_device_local: bool,

@@ -52,7 +52,7 @@ pub(crate) struct PhysicalDevice {
     /// Whether the extension of timeline semaphores must be enabled, because the device is older than Vulkan 1.2.
     pub(crate) timelines_extension: bool,
     max_texel_buffer_elements: u32,
-    /// The size and alignment in which non-coherent memory is invalidated and flushed, bytes.
+    /// The size and alignment in bytes in which non-coherent memory is invalidated and flushed.
     pub(crate) non_coherent_atom: u64,
     /// The maximum number of storage buffers that a kernel may bind.
     pub(crate) storage_buffers: u32,
@@ -71,7 +71,7 @@ pub(crate) struct PhysicalDevice {
     /// `VK_KHR_external_semaphore_fd`).
     pub(crate) memory_files: bool,
     pub(crate) semaphore_files: bool,
-    /// The alignment of imported memory, bytes; `None` if memory cannot be imported.
+    /// The alignment of imported memory in bytes; `None` if memory cannot be imported.
     pub(crate) lent_alignment: Option<u64>,
     pub(crate) info: DeviceInfo,
 }

@@ -27,7 +27,7 @@ const SMALL: u64 = 64;
 pub(crate) struct DirectMemory {
     /// The memory type.
     pub(crate) memory_type: u32,
-    /// The maximum size of an upload that uses it by default, bytes.
+    /// The maximum size in bytes of an upload that uses it by default.
     pub(crate) largest: u64,
 }
 

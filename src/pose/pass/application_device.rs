@@ -14,11 +14,14 @@ impl PassRequest<'_> {
     /// submitted to the engine's queue before.
     ///
     /// # Errors
-    /// When the engine is the CPU or opened its device itself, there is no layer, a weight is out of range, the
-    /// number of references or joints differs from the number of tracks, the layout for a skeleton is track by track,
-    /// a buffer is null, a range is not aligned, is too short, ends beyond its buffer or is longer than the device can
-    /// bind, the result overlaps an input, or
-    /// the device fails.
+    /// * When the engine is the CPU, or was not made from the application's device.
+    /// * When there is no layer, or a weight is out of range.
+    /// * When the number of references or joints differs from the number of tracks.
+    /// * When the layout for a skeleton is track by track.
+    /// * When a buffer is null, or a range is not aligned, is too short, ends beyond its buffer, or is longer than the
+    ///   device can bind.
+    /// * When the result overlaps an input.
+    /// * When the device fails.
     ///
     /// # Safety
     /// The buffers must belong to the engine's device, be bound to memory, have the usage `STORAGE_BUFFER`, and

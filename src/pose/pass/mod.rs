@@ -21,9 +21,9 @@ use crate::pose::skeleton::Skeleton;
 ///
 /// Each input is a range of a buffer with four f32 for each rotation, as
 /// [`Request::to_buffer`](crate::engine::clip::request::Request::to_buffer) and
-/// [`ClipTarget::record`](crate::gpu::clip::ClipTarget::record) write it. Ranges start at multiples of 256
-/// bytes, layers of a blend at multiples of 16. Layers of a blend that are contiguous in one buffer, from a multiple
-/// of 256 bytes on, are read directly; others are copied into one buffer first.
+/// [`ClipTarget::record`](crate::gpu::clip::ClipTarget::record) write it. Layers of a blend must start at multiples of
+/// 16 bytes, all other ranges at multiples of 256. Layers of a blend that follow each other in one buffer, the first at
+/// a multiple of 256 bytes, are read directly; others are first copied into one buffer.
 #[derive(Debug, Clone, Copy)]
 #[non_exhaustive]
 pub enum PosePass<'a> {
@@ -119,7 +119,7 @@ impl Engine {
 }
 
 impl<'a> PassRequest<'a> {
-    /// The length of each input, bytes.
+    /// The length of each input in bytes.
     #[must_use]
     pub fn input_bytes(&self) -> u64 {
         let (tracks, samples, _) = self.shape;
@@ -128,7 +128,7 @@ impl<'a> PassRequest<'a> {
             .saturating_mul(VALUE)
     }
 
-    /// The length of the result, bytes: that of an input, or twice as much for [`PosePass::World`], whose result is
+    /// The length of the result in bytes: that of an input, or twice as much for [`PosePass::World`], whose result is
     /// `[frame][track]`, a rotation `x y z w` and a position `x y z 0` each.
     #[must_use]
     pub fn bytes(&self) -> u64 {

@@ -25,7 +25,7 @@ pub struct ConfigurationRates {
     pub base: BodyVelocity,
     /// The velocity of each free joint, in the world's axes, or in those of the body's place in its parent.
     pub free: Vec<BodyVelocity>,
-    /// The angular velocity of each ball, in the body's axes, rad/s.
+    /// The angular velocity of each ball in the body's axes, in rad/s.
     pub balls: Vec<DVec3>,
     /// The velocity of each hinge (rad/s) and slide (m/s).
     pub scalars: Vec<f64>,
@@ -34,7 +34,7 @@ pub struct ConfigurationRates {
 /// The position and rotation of a body.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BodyPose {
-    /// The position of its origin, metres.
+    /// The position of its origin in metres.
     pub position: DVec3,
     /// Its rotation, a unit quaternion.
     pub rotation: DQuat,
@@ -43,9 +43,9 @@ pub struct BodyPose {
 /// The velocities of a body.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct BodyVelocity {
-    /// The velocity of its origin, m/s.
+    /// The velocity of its origin in m/s.
     pub linear: DVec3,
-    /// Its angular velocity, rad/s.
+    /// Its angular velocity in rad/s.
     pub angular: DVec3,
 }
 

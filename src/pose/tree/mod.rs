@@ -35,13 +35,13 @@ pub struct TreeBody {
     pub name: String,
     /// The index of its parent; `None` in the world.
     pub parent: Option<usize>,
-    /// Its position in the parent's frame while its joints are at their references, metres.
+    /// The position, in metres in the parent's frame, while the joints are at their references.
     pub position: DVec3,
-    /// Its rotation in the parent's frame while its joints are at their references, a unit quaternion.
+    /// The rotation in the parent's frame while the joints are at their references: a unit quaternion.
     pub rotation: DQuat,
-    /// The joints that connect it with its parent, in the order in which they act. A body without joints is fixed.
+    /// The joints between the body and its parent, in the order in which they act. A body without joints is fixed.
     pub joints: Vec<TreeJoint>,
-    /// Its centre of mass in its frame, metres, if that is known.
+    /// The centre of mass, in metres in the body's frame, if the file has it.
     pub mass_centre: Option<DVec3>,
 }
 
@@ -54,7 +54,7 @@ pub struct TreeJoint {
     pub kind: JointKind,
     /// The unit axis of a hinge or a slide, in the body's frame.
     pub axis: DVec3,
-    /// The point about which a hinge or a ball turns, in the body's frame, metres.
+    /// The point about which a hinge or a ball turns, in metres in the body's frame.
     pub anchor: DVec3,
     /// The value of a hinge (rad) or a slide (metres) at which it does not move the body.
     pub reference: f64,
@@ -214,8 +214,11 @@ impl Tree {
     /// Makes a tree of bodies, parents before their children.
     ///
     /// # Errors
-    /// When a parent does not come before its child, a name is repeated, a constant is not finite, a rotation or an
-    /// axis does not have the length 1, a free joint is not alone, or a joint mimics none of the others.
+    /// * When a parent does not come before its child, or a name is repeated.
+    /// * When a constant is not finite, or a rotation or an axis does not have the length 1.
+    /// * When a body has another joint beside a free one.
+    /// * When a joint mimics a joint that does not exist, is neither a hinge nor a slide, or mimics the first joint in
+    ///   a circle.
     pub fn new(bodies: Vec<TreeBody>) -> Result<Self, TreeError> {
         check_parents(&bodies)?;
         check_names("bodies", bodies.iter().map(|body| &body.name))?;

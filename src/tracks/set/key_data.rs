@@ -11,7 +11,8 @@ use crate::tracks::set::{TrackSet, check_finite, check_length};
 pub struct Tcb {
     /// With 1 the velocity at the key is 0, with -1 it is doubled.
     pub tension: f64,
-    /// With -1 the curve has a corner at the key, with 1 a corner to the other side.
+    /// With -1 the curve has a corner at the key; with 1 the corner points the other way, because the curve swings out
+    /// beyond the key before and after it.
     pub continuity: f64,
     /// With 1 the tangent at the key follows the interval before it, with -1 the interval after it.
     pub bias: f64,
@@ -20,7 +21,7 @@ pub struct Tcb {
 /// The largest magnitude of a tension, a continuity or a bias. With it, computations do not overflow.
 pub(crate) const LARGEST_TCB: f64 = 1e6;
 
-/// The largest angular velocity at a key, radians per second.
+/// The largest angular velocity at a key in radians per second.
 const FASTEST: f64 = 1e12;
 
 impl Tcb {
@@ -62,7 +63,7 @@ impl<T: Clone> KeyData<T> {
 }
 
 impl TrackSet {
-    /// Sets the angular velocity at each key of a track, radians per second in the body frame, for
+    /// Sets the angular velocity at each key of a track in radians per second in the body frame, for
     /// [`HERMITE`](crate::method::hermite::HERMITE).
     ///
     /// # Errors

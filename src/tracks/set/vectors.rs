@@ -88,12 +88,13 @@ impl TrackSet {
     /// Appends a track for a body that follows a path ([`Engine::follow`](crate::engine::Engine::follow)), and
     /// returns its index.
     ///
-    /// The points are translation keys at `times`, seconds, strictly increasing; the track has no rotation keys
+    /// The points are translation keys at `times` in seconds, strictly increasing; the track has no rotation keys
     /// except an identity. `ups` are upward directions at some points: it is empty, or has one entry for each point.
     ///
     /// # Errors
-    /// When there are no points, the lengths differ, the times are not strictly increasing, a number is not finite or
-    /// exceeds 1e30 in magnitude, or an upward direction has no length.
+    /// * When there are no points, or the lengths of the lists differ.
+    /// * When the times are not strictly increasing.
+    /// * When a number is not finite or exceeds 1e30 in magnitude, or an upward direction has no length.
     pub fn push_path<V: Copy + Into<Vec3>>(
         &mut self,
         name: &str,

@@ -282,7 +282,7 @@ impl Bench<'_> {
         Ok(())
     }
 
-    /// The time of one dispatch of a row with a barrier between them, microseconds: the median of some rows.
+    /// The time in microseconds of one dispatch of a row with a barrier between them: the median of some rows.
     fn row(
         &mut self,
         dispatch: RowDispatch<'_>,
@@ -308,7 +308,7 @@ impl Bench<'_> {
         Ok(median(times))
     }
 
-    /// Submits what was recorded. The time of each part of a row, microseconds.
+    /// Submits what was recorded. Returns the time of each part of a row in microseconds.
     fn submitted(&mut self) -> Result<f64, VulkanError> {
         let spent = self.submission.run()?;
         let seconds = spent.map_or(0.0, |spent| spent.on_device.as_secs_f64());
@@ -580,7 +580,7 @@ impl Bench<'_> {
         Ok((row, of_lanes.try_into().ok()))
     }
 
-    /// Measures the ceilings. The time of filling a byte, microseconds.
+    /// Measures the ceilings. Returns the time of filling a byte in microseconds.
     fn ceilings(&mut self, results: &Buffer, constants: &Buffer) -> Result<f64, VulkanError> {
         let mut found = Vec::new();
         let mut add = |name, time, bytes| found.push(Ceiling { name, time, bytes });

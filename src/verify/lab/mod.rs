@@ -113,7 +113,7 @@ pub struct VariantTime {
 pub struct Decision {
     /// The rule.
     pub rule: &'static str,
-    /// The times that it looks at, microseconds.
+    /// The times that it looks at, in microseconds.
     pub microseconds: Vec<f64>,
     /// Whether it applies.
     pub applies: bool,

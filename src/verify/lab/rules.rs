@@ -15,7 +15,7 @@ const GAIN_OF_STREAMING: f64 = 1.1;
 /// The microseconds that barriers between kernels alone must save to be chosen.
 const SAVED_BY_SCOPES: f64 = 2.0;
 
-/// A time that was measured twice, microseconds.
+/// A time in microseconds that was measured twice.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Timed {
     /// The shorter and the longer time.

@@ -6,7 +6,8 @@ use std::borrow::Cow;
 use glam::{DVec3, Quat, Vec3};
 use serde::Serialize;
 use tumble::{
-    Device, Engine, Error, Layout, Quantity, SampleTimes, ScalarQuantity, Timeline, TrackSet,
+    Channel, Device, Engine, Error, Layout, Quantity, SampleTimes, ScalarQuantity, Timeline,
+    TrackSet,
 };
 use tumble_formats::dialect::write::WrittenDialect;
 use tumble_formats::end_frame::{EndFrame, EndRows, sample_to_end};
@@ -211,8 +212,13 @@ impl EvaluationJob<'_> {
         if is_of_scalars && has(|clip| clip.set.track_count() > 0) {
             lost.push("the rotations");
         }
-        if output.poses().is_none() && has(Motion::has_vectors) {
-            lost.push("the translations and scales");
+        if output.poses().is_none() {
+            if has(|clip| clip.has_keys_of(Channel::Translation)) {
+                lost.push("the translations");
+            }
+            if has(|clip| clip.has_keys_of(Channel::Scale)) {
+                lost.push("the scales");
+            }
         }
         let first = clips
             .iter()

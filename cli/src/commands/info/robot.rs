@@ -111,7 +111,7 @@ impl RobotSummary {
         let values = words::count(self.joint_names.len(), "value");
         line(
             "joints",
-            format!("{joints}; hinges and slides have {values}"),
+            format!("{joints}; hinges and slides have {values} in all"),
         );
         if !self.poses.is_empty() {
             line("poses", self.poses.join(", "));

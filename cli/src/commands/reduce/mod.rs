@@ -408,7 +408,7 @@ impl Arguments {
             ..target.motion_options()
         };
         let otherwise = match keys_per_channel {
-            // If the file is edited instead of written anew, the bytes of its old keys stay in it.
+            // A file that is edited keeps its other content, uncompressed; only new files are compressed.
             true if self.meshopt => Some("compression makes"),
             true => makes_new(&self.inputs),
             false => Some("keys at uneven times make"),

@@ -191,7 +191,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     words::note(&format!(
         "{}, {}, on {}, {} → {destination}",
         words::count(inputs.len(), "input"),
-        words::count(each_once(methods.iter().flatten()).len(), "method"),
+        counted_choices(&methods),
         device.label,
         words::bytes(text.len() as f64),
     ));
@@ -433,6 +433,22 @@ fn bytes(shown: &[ShownClip], methods: &[Vec<ResultChoice>]) -> f64 {
         .sum()
 }
 
+/// `authored and 15 methods`: `authored` stands for the methods of the file, and is none itself.
+fn counted_choices(methods: &[Vec<ResultChoice>]) -> String {
+    let choices = each_once(methods.iter().flatten());
+    let is_authored = |choice: &ResultChoice| *choice == ResultChoice::By(MethodChoice::AUTHORED);
+    let named = choices
+        .iter()
+        .filter(|&choice| !is_authored(choice))
+        .count();
+    let counted = words::count(named, "method");
+    match (named, named < choices.len()) {
+        (0, true) => "authored".to_owned(),
+        (_, true) => format!("authored and {counted}"),
+        (_, false) => counted,
+    }
+}
+
 /// The methods of each clip, if a page can hold the results.
 fn fitting(
     shown: &[ShownClip],
@@ -447,7 +463,7 @@ fn fitting(
         "{} by {} are {}, more than the {} that a page can hold; ask for fewer methods (-m), \
          fewer frames (--fps, --start, --end) or fewer inputs",
         words::count(rotations as usize, "rotation"),
-        words::count(each_once(methods.iter().flatten()).len(), "method"),
+        counted_choices(&methods),
         words::bytes(bytes),
         words::bytes(MAX_PAGE_BYTES),
     )))

@@ -20,7 +20,7 @@ pub(super) enum AccessorData<'a> {
     Channel(ClipSamples<'a>, usize, Property),
     /// The keys of a channel.
     Keys(Property, Vec<f32>),
-    /// Rotations of 16 bits a component.
+    /// Rotations of 16 bits per component.
     Quantized(Vec<i16>),
     /// Rotations of few bits, which meshopt's filter decodes to 16 bits for each component.
     Filtered(Vec<[u8; 8]>),

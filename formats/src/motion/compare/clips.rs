@@ -290,8 +290,9 @@ impl ClipPair<'_> {
     /// poses are relative to the world, otherwise to the parents.
     ///
     /// # Errors
-    /// When no track of one clip corresponds to a track of the other, when a track has another parent and the poses are
-    /// relative to the parents, when a clip cannot be sampled, or when poses in the world cannot be computed.
+    /// * When no track of one clip corresponds to a track of the other.
+    /// * When a track has another parent in the other clip, and the poses are relative to the parents.
+    /// * When a clip cannot be sampled, or the poses in the world cannot be computed.
     pub fn differences(
         &self,
         engine: &Engine,

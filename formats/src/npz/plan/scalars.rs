@@ -114,7 +114,7 @@ impl ArchivePlan {
         let names = names.unwrap_or_else(|| {
             warnings.warn(Code::UnnamedJoints, || {
                 let message = format!(
-                    "the file does not name its {count} joints; they are called joint_0, joint_1 …, in the order of the file; --robot FILE gives them \
+                    "the file does not name its joints ({count}); they are called joint_0, joint_1 …, in the order of the file; --robot FILE gives them \
                      the names of the robot's joints"
                 );
                 (None, message)

@@ -178,7 +178,7 @@ def _tell(report: Report) -> None:
         _say(f"warning: took no part, since its wheel is another: {machine}")
     rate = report.rotations / max(report.seconds, 1e-9)
     _say(
-        f"{report.made} made, {report.skipped} skipped, {len(report.failed)} failed of "
+        f"{report.made} made, {report.skipped} kept, {len(report.failed)} failed of "
         f"{report.inputs} inputs in {report.shards} shards; {report.rotations:.3g} rotations, "
         f"{rate:.3g} a second, {report.workers} workers, {report.seconds:.1f} s"
     )

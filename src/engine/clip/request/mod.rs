@@ -32,9 +32,9 @@ use crate::tracks::set::TrackSet;
 
 /// A request for samples of a clip ([`Clip::request`]) or of a set ([`Engine::request`]).
 ///
-/// It selects tracks and samples and sets the layout and the encoding; then one of its functions evaluates it into a
-/// destination. For a set, only the segments that the samples need are prepared, piece by piece if that takes less
-/// memory.
+/// A request selects tracks and samples, and sets the layout and the encoding. Then one of the functions below
+/// evaluates the samples into a destination. For a set, only the segments that the samples need are prepared, piece by
+/// piece if that takes less memory.
 ///
 /// ```
 /// use tumble::{Device, Encoding, Engine, SampleTimes, Layout, TrackSet, method};
@@ -58,7 +58,7 @@ use crate::tracks::set::TrackSet;
 #[must_use = "a request does nothing until its result is sent somewhere"]
 pub struct Request<'a> {
     source: RequestSource<'a>,
-    frames: &'a SampleTimes,
+    times: &'a SampleTimes,
     layout: Layout,
     encoding: Encoding,
     tracks: Option<Range<usize>>,
@@ -95,11 +95,11 @@ impl RequestSource<'_> {
         }
     }
 
-    fn timeline(&self, frames: &SampleTimes) -> Result<Timeline, Error> {
+    fn timeline(&self, times: &SampleTimes) -> Result<Timeline, Error> {
         Ok(match self {
-            Self::Clip(clip) => clip.timeline(frames)?,
+            Self::Clip(clip) => clip.timeline(times)?,
             Self::Set { set, .. } | Self::Grouped(GroupedSet { set, .. }) => {
-                frames.resolve(set.track_count(), set.time_span())?
+                times.resolve(set.track_count(), set.time_span())?
             }
         })
     }
@@ -175,8 +175,8 @@ pub(crate) struct RequestPart {
 
 impl<'a> Request<'a> {
     /// All tracks of a clip, track by track, as values of four f32.
-    pub(crate) fn of_clip(clip: &'a Clip, frames: &'a SampleTimes) -> Self {
-        Self::new(RequestSource::Clip(clip), frames)
+    pub(crate) fn of_clip(clip: &'a Clip, times: &'a SampleTimes) -> Self {
+        Self::new(RequestSource::Clip(clip), times)
     }
 
     /// The same of a set.
@@ -184,7 +184,7 @@ impl<'a> Request<'a> {
         engine: &'a Engine,
         set: &'a TrackSet,
         interpolations: PerTrack<Interpolation>,
-        frames: &'a SampleTimes,
+        times: &'a SampleTimes,
     ) -> Self {
         let source = match interpolations.uniform(set.track_count()) {
             Some(interpolation) => RequestSource::Set {
@@ -194,13 +194,13 @@ impl<'a> Request<'a> {
             },
             None => RequestSource::Grouped(GroupedSet::new(engine, set, interpolations)),
         };
-        Self::new(source, frames)
+        Self::new(source, times)
     }
 
-    fn new(source: RequestSource<'a>, frames: &'a SampleTimes) -> Self {
+    fn new(source: RequestSource<'a>, times: &'a SampleTimes) -> Self {
         Self {
             source,
-            frames,
+            times,
             layout: Layout::TrackMajor,
             encoding: Encoding::F32,
             tracks: None,
@@ -237,9 +237,10 @@ impl Request<'_> {
     /// The number of values of the result, and the bytes of each.
     ///
     /// # Errors
-    /// When the frames do not fit the clip, the tracks or samples are out of range, the encoding is for rotations and the
-    /// quantity is a velocity or an acceleration, or the set's interpolations are for another number of tracks or have
-    /// several quantities.
+    /// * When the sample times do not fit the tracks ([`SampleTimes::resolve`](crate::SampleTimes::resolve)).
+    /// * When the selected tracks or samples are out of range.
+    /// * When the encoding is only for rotations, and the quantity is a velocity or an acceleration.
+    /// * When the set's interpolations are for another number of tracks, or have several quantities.
     pub fn size(&self) -> Result<(usize, usize), Error> {
         let RequestPart { window, .. } = self.part()?;
         Ok((window.len(), self.encoding.bytes()))
@@ -303,14 +304,14 @@ impl Request<'_> {
     /// Evaluates in chunks of about `chunk` values, which should be at least one row of the layout. `sink` uses one
     /// chunk while the next ones are evaluated.
     ///
-    /// The memory is that of three chunks, and for a set also of segments:
+    /// A stream needs memory for three chunks, and for a set also for segments:
     ///
     /// * track by track, if a chunk has whole tracks: the segments of one chunk's tracks at a time;
     /// * otherwise: all segments that the request's samples need, if they take no more than
     ///   [`EngineOptions::memory`](crate::machine::options::EngineOptions::memory) (256 MiB if it has no limit), and else
     ///   those of a part of a chunk at a time.
     ///
-    /// With several interpolations it is also that of the keys, whose tracks are sorted by interpolation.
+    /// If tracks have several interpolations, it also needs memory for a copy of the keys, sorted by interpolation.
     ///
     /// ```
     /// # use glam::{Quat, Vec4};
@@ -453,7 +454,7 @@ impl Request<'_> {
     /// The sample times of the request, and the part of them that the result has.
     pub(crate) fn part(&self) -> Result<RequestPart, Error> {
         check_encoding(self.encoding, self.source.quantity()?)?;
-        let timeline = self.source.timeline(self.frames)?;
+        let timeline = self.source.timeline(self.times)?;
         let (tracks, samples) = (self.source.track_count(), timeline.len());
         let part = |asked: &Option<Range<usize>>, all| asked.clone().unwrap_or(0..all);
         let (window_tracks, window_samples) =

@@ -20,9 +20,11 @@ impl Request<'_> {
     /// request of a clip is repeated, its work lists are already on the device.
     ///
     /// # Errors
-    /// As [`Request::size`]; also when the engine is the CPU or opened its device itself, the buffer is null, the
-    /// range does not start at a multiple of a value's size, is too short or ends beyond the buffer, or the device
-    /// fails.
+    /// * As [`Request::size`].
+    /// * When the engine is the CPU, or was not made from the application's device.
+    /// * When the buffer is null, or the range does not start at a multiple of a value's size, is too short, or ends
+    ///   beyond the buffer.
+    /// * When the device fails.
     ///
     /// # Safety
     /// The buffer must belong to the engine's device, be bound to memory, have the usages `STORAGE_BUFFER` and
