@@ -8,7 +8,8 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 
 python=${PYTHON:-python3}
-environment=target/maturin
+target=${CARGO_TARGET_DIR:-target}
+environment=$target/maturin
 requirements='maturin[zig]>=1.9,<2'
 if ! [ "$(cat "$environment/requirements.txt" 2>/dev/null)" = "$requirements" ]; then
     echo "installing maturin and zig into $environment" >&2
@@ -22,7 +23,7 @@ glibc=()
 if [ "$(uname)" = Linux ] && [ "${GLIBC:-2.28}" != system ]; then
     glibc=(--zig --compatibility manylinux_2_28)
     # maturin looks for it there.
-    PATH=$PWD/$environment/bin:$PATH
+    PATH=$(cd "$environment" && pwd)/bin:$PATH
 fi
 "$environment/bin/maturin" build --manifest-path python/Cargo.toml --release --strip \
-    --interpreter "$python" --out target/wheels ${glibc[@]+"${glibc[@]}"} "$@"
+    --interpreter "$python" --out "$target/wheels" ${glibc[@]+"${glibc[@]}"} "$@"

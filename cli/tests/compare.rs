@@ -152,6 +152,27 @@ fn what_cannot_be_compared_is_refused() {
             "two files or two directories are compared, not 1 file",
         ),
         (&["compare", "a.dat", "b.dat", "folder/a.dat"], 2, "not 3"),
+        (
+            &["compare", "a.dat", "nope"],
+            4,
+            "nope: error[E001]: cannot be read: ",
+        ),
+        (
+            &["compare", "folder", "nope"],
+            4,
+            "nope: error[E001]: cannot be read: ",
+        ),
+        (&["compare", "folder"], 2, "not 1 directory\n"),
+        (
+            &["compare", "folder", "a.dat"],
+            2,
+            "but folder is a directory and a.dat is none",
+        ),
+        (
+            &["compare", "folder", "a.dat", "folder"],
+            2,
+            "not 2 directories and 1 file",
+        ),
         (&["compare", "a.dat", "bad.dat"], 4, "bad.dat:2"),
         (
             &["compare", "part.dat", "late.dat"],
@@ -1011,8 +1032,43 @@ fn directories_are_compared_file_by_file() {
     );
     let failed = run(folder, &["compare", "before", "after", "a.dat"]);
     assert!(
-        failed.words.contains("two files or two directories"),
+        failed.words.contains("not 2 directories and 1 file"),
         "{}",
         failed.words
     );
+    write("before/more.dat", &text);
+    let report = String::from_utf8(run(folder, &line).out).unwrap();
+    let expected = "2 files only in before: more.dat … (--json lists all)\n";
+    assert!(report.contains(expected), "{report}");
+    let refused = run(folder, &[&line[..], &["--csv"]].concat());
+    assert!(refused.code == 2 && refused.words.contains("(--json lists all pairs of files)"));
+}
+
+/// A program that reads the JSON can open the files of these names; a terminal gets no line feed of a name.
+#[cfg(unix)]
+#[test]
+fn names_in_json_are_as_they_are() {
+    let temporary = sample_folder();
+    let folder = temporary.path();
+    for side in ["x", "y"] {
+        std::fs::create_dir(folder.join(side)).unwrap();
+        std::fs::copy(
+            folder.join("a.dat"),
+            folder.join(side).join("new\nline.dat"),
+        )
+        .unwrap();
+    }
+    std::fs::copy(folder.join("a.dat"), folder.join("x/lone\t.dat")).unwrap();
+    let (code, found) = json(folder, &["compare", "x", "y", "--json"]);
+    assert_eq!(
+        (code, &found["pairs"][0]["file"], &found["missing"][0][0]),
+        (0, &"new\nline.dat".into(), &"lone\t.dat".into())
+    );
+    let report = String::from_utf8(succeed(folder, &["compare", "x", "y"]).out).unwrap();
+    assert!(report.contains("only in x: lone\\t.dat\n"), "{report}");
+    let files = ["compare", "x/new\nline.dat", "y/new\nline.dat"];
+    let (_, found) = json(folder, &[&files[..], &["--json"]].concat());
+    assert_eq!(found["clips"][0]["inputs"][0], "x/new\nline.dat");
+    let report = String::from_utf8(succeed(folder, &files).out).unwrap();
+    assert!(report.starts_with("x/new\\nline.dat and y/"), "{report}");
 }

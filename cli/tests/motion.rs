@@ -590,6 +590,35 @@ fn converting_and_smoothing_keep_the_rest_of_a_file() {
     assert_eq!(info.matches("0.25 to 0.75 s").count(), 2, "{info}");
 }
 
+/// A warning about an animation stands under it, and not under the first one.
+#[test]
+fn info_lists_the_warnings_of_each_animation() {
+    let temporary = sample_folder();
+    let folder = temporary.path();
+    let channel = r#""name":"Run","channels":[{"sampler":0,"target":{"node":0,"path":"colour"}},"#;
+    let odd = two_animations().replacen(r#""name":"Run","channels":["#, channel, 1);
+    fs::write(folder.join("fox.gltf"), odd).unwrap();
+    for (options, expected) in [
+        (&[][..], vec![0, 1]),
+        (&["--animation", "Walk"], vec![1]),
+        (&["--animation", "Run"], vec![1]),
+    ] {
+        let info = succeed(folder, &[&["info", "fox.gltf", "--json"], options].concat());
+        let clips: serde_json::Value = serde_json::from_slice(&info.out).unwrap();
+        let warnings = clips.as_array().unwrap().iter().map(|clip| {
+            let warnings = clip["warnings"].as_array().unwrap();
+            let is_of_run = |it: &&serde_json::Value| {
+                it.as_str()
+                    .unwrap()
+                    .contains("fox.gltf:/animations/1/channels/0/target/path: warning[W")
+            };
+            assert!(warnings.iter().all(|it| is_of_run(&it)), "{warnings:?}");
+            warnings.len()
+        });
+        assert_eq!(warnings.collect::<Vec<_>>(), expected, "{options:?}");
+    }
+}
+
 #[test]
 fn one_name_of_two_animations_is_refused_with_their_places() {
     let temporary = sample_folder();

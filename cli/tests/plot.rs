@@ -439,14 +439,16 @@ fn png_shows_the_same_picture() {
 #[test]
 fn a_report_has_every_figure_and_a_page_that_shows_them() {
     let temporary = sample_folder();
+    // Two files of one name: the directories tell them apart.
+    fs::create_dir(temporary.path().join("b & c")).unwrap();
     fs::rename(
         temporary.path().join("b.dat"),
-        temporary.path().join("b & c.dat"),
+        temporary.path().join("b & c/a.dat"),
     )
     .unwrap();
     succeed(
         temporary.path(),
-        &["plot", "--report", "a.dat", "b & c.dat", "-o", "report"],
+        &["plot", "--report", "a.dat", "b & c/a.dat", "-o", "report"],
     );
     let folder = temporary.path().join("report");
     let page = fs::read_to_string(folder.join("index.html")).unwrap();
@@ -467,11 +469,18 @@ fn a_report_has_every_figure_and_a_page_that_shows_them() {
     for name in [
         "a-slerp-dimension-2.svg",
         "a-all-dimension-8.svg",
-        "b%20%26%20c-sphere.svg",
+        "b%20%26%20c-a-sphere.svg",
     ] {
         assert!(shown.contains(&name), "{name} in {shown:?}");
     }
-    assert!(page.contains("<h2>b &amp; c.dat</h2>") && page.contains("a key every 0.5000 s"));
+    assert!(page.contains("<h2>b &amp; c/a.dat</h2>") && page.contains("<h2>a.dat</h2>"));
+    assert!(page.contains("a key every 0.5000 s"));
+    let marks = Marks::of(&folder.join("b & c-a-slerp-dimension-2.svg"));
+    let has_title = marks
+        .texts
+        .iter()
+        .any(|text| text.starts_with("b & c/a.dat: "));
+    assert!(has_title, "{:?}", marks.texts);
     let again = run(
         temporary.path(),
         &["plot", "--report", "a.dat", "-o", "report"],

@@ -163,6 +163,28 @@ fn a_dry_run_names_the_results_that_the_batch_then_makes_skips_and_removes() {
         reason("eval in -o out -n --resume"),
         "in/a.dat → out/a.npy (made again: its file was changed or damaged)"
     );
+    fs::remove_file(folder.join("out/a.npy")).unwrap();
+    assert_eq!(
+        reason("eval in -o out -n --resume"),
+        "in/a.dat → out/a.npy (made again: its file is missing)"
+    );
+    #[cfg(unix)]
+    {
+        let of_link = "in/a.dat → out/a.npy (made again: its file was replaced by a link)";
+        for target in ["m.Run.npy", "../a.dat", "nothing"] {
+            std::os::unix::fs::symlink(target, folder.join("out/a.npy")).unwrap();
+            let found = reason("eval in -o out -n --resume");
+            assert_eq!(found, of_link, "{target}");
+            let check = run(folder, &words("check out"));
+            let expected = "out/a.npy: its file was replaced by a link";
+            assert!(check.words.contains(expected), "{}", check.words);
+            fs::remove_file(folder.join("out/a.npy")).unwrap();
+        }
+        // A link to the same bytes is as good.
+        std::os::unix::fs::symlink("d.npy", folder.join("out/a.npy")).unwrap();
+        let whole = "in/a.dat → out/a.npy (complete, would be skipped)";
+        assert_eq!(reason("eval in -o out -n --resume"), whole);
+    }
     let one = run(folder, &words("eval in/m.gltf -o m.npy -n"));
     assert!(
         one.code == 4 && one.words.contains("--animation"),

@@ -130,6 +130,42 @@ fn missing_shards_are_named_and_made() {
     assert_eq!(tree(&folder.join("out")), tree(&folder.join("one")));
 }
 
+/// Without `plan.json` nothing says how many shards there are: each command names the file, and resuming shards
+/// writes it again.
+#[test]
+fn a_lost_plan_is_named_and_written_again() {
+    let (temporary, bytes) = library();
+    let folder = temporary.path();
+    succeed(folder, &["eval", "walks", "-o", "one"]);
+    succeed(folder, &shard("out", &bytes, "2", &[]));
+    let plan = folder.join("out/manifest.d/plan.json");
+    let before = fs::read(&plan).unwrap();
+    fs::remove_file(&plan).unwrap();
+    for (line, code) in [
+        ("merge out", 8),
+        ("check out", 8),
+        ("eval walks -o out --resume", 2),
+        ("eval walks -o out --resume --dry-run", 2),
+    ] {
+        let line: Vec<&str> = line.split(' ').collect();
+        let refused = run(folder, &line);
+        assert_eq!(refused.code, code, "{line:?}: {}", refused.words);
+        let expected = "plan.json: is missing, and there are files of 1 shard; `tumble eval";
+        assert!(refused.words.contains(expected), "{}", refused.words);
+    }
+    let resumed = succeed(folder, &shard("out", &bytes, "1/1", &["--resume"]));
+    assert!(
+        resumed.words.contains("4 results skipped"),
+        "{}",
+        resumed.words
+    );
+    assert_eq!(fs::read(&plan).unwrap(), before);
+    succeed(folder, &["merge", "out"]);
+    assert_eq!(tree(&folder.join("out")), tree(&folder.join("one")));
+    let merged = run(folder, &["merge", "nowhere"]);
+    assert!(merged.code == 4 && merged.words.contains("nowhere: cannot be read: "));
+}
+
 /// Merging finds results that are gone or cut, and leaves the shards as they are until these are made again.
 #[test]
 fn missing_results_are_not_merged() {

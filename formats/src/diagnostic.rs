@@ -35,6 +35,18 @@ pub enum Location {
     Inside(String),
 }
 
+impl Location {
+    /// The index of the animation in which it is, in a file of glTF's form.
+    #[must_use]
+    pub fn animation(&self) -> Option<usize> {
+        let Self::Inside(pointer) = self else {
+            return None;
+        };
+        let rest = pointer.strip_prefix("/animations/")?;
+        rest.split('/').next()?.parse().ok()
+    }
+}
+
 impl fmt::Display for Location {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {

@@ -198,6 +198,11 @@ pub(crate) fn is_whole(folder: &Path, name: &str, bytes: u64, sha256: &str) -> i
     Ok(file.metadata()?.len() == bytes && of_file(file)? == sha256)
 }
 
+/// Whether a link stands where a manifest in `folder` names a file.
+pub(crate) fn is_link(folder: &Path, name: &str) -> bool {
+    folder.join(name).is_symlink()
+}
+
 /// The SHA-256 of a whole file.
 fn of_file(mut file: File) -> io::Result<String> {
     let mut digest = Digest::default();

@@ -135,6 +135,8 @@ fn in_folder(
     let shards = RecordedPlan::read(folder)?;
     if let Some(recorded) = &shards {
         refuse_shards(recorded, &names, folder, options)?;
+    } else {
+        refuse_lost_plan(folder, options)?;
     }
     target::create_folder(folder)?;
     let manifest = Manifest::open(
@@ -265,6 +267,14 @@ pub(super) fn refuse_shards(
              directory"
         ))),
     }
+}
+
+/// Refuses a directory whose shards have lost the record of their plan, unless all results are made again.
+pub(super) fn refuse_lost_plan(folder: &Path, options: OutputOptions<'_>) -> Result<(), Failure> {
+    let lost = RecordedPlan::lost(folder).filter(|_| !options.overwrite);
+    lost.map_or(Ok(()), |message| {
+        Err(Failure::usage(message).hinted("; --overwrite makes all results again"))
+    })
 }
 
 /// A directory of results. It makes the subdirectories of results, and refuses links.

@@ -19,7 +19,8 @@ use crate::batch::digest::{self, InputFile};
 use crate::batch::entry::{ManifestEntry, ManifestLines, PreviousEntries};
 use crate::batch::manifest::PlannedResults;
 use crate::batch::output_plan::{
-    OutputOptions, UnplannedInput, goes_to_file, refuse_existing, refuse_shards, without_results,
+    OutputOptions, UnplannedInput, goes_to_file, refuse_existing, refuse_lost_plan, refuse_shards,
+    without_results,
 };
 use crate::batch::owner::{Owner, ReplacedOwners};
 use crate::batch::pipeline::{SEVERAL_CLIPS_REMEDY, clip_file_names, hash_before_reading};
@@ -264,6 +265,8 @@ impl<'a> PreviewedFolder<'a> {
         if let Some(recorded) = &shards {
             let result_names = name_results(files, out, format, options.naming);
             refuse_shards(recorded, &result_names, out, options)?;
+        } else {
+            refuse_lost_plan(out, options)?;
         }
         let (mut lines, _) = ManifestLines::of_folder(out, options.overwrite)?;
         if shards.is_some() {
@@ -333,8 +336,8 @@ impl<'a> PreviewedFolder<'a> {
             let known = self.previous.entries().get(&output);
             let reason: Option<Cow<'static, str>> = match (self.failed.get(name), known) {
                 (Some(reason), _) if resume => Some(reason.clone().into()),
-                _ if !exists => None,
                 (_, Some(entry)) if resume => Some(self.why_made_again(entry, path).into()),
+                _ if !exists => None,
                 _ => Some(REPLACED.into()),
             };
             self.preview.results.push(PreviewedResult {
@@ -382,6 +385,12 @@ impl<'a> PreviewedFolder<'a> {
         let (bytes, sha256) = (entry.output_bytes, &entry.output_sha256);
         match digest::is_whole(self.out, &entry.output, bytes, sha256) {
             Ok(true) => "made again: not all results of its input are complete".to_owned(),
+            _ if digest::is_link(self.out, &entry.output) => {
+                "made again: its file was replaced by a link".to_owned()
+            }
+            Err(error) if error.kind() == io::ErrorKind::NotFound => {
+                "made again: its file is missing".to_owned()
+            }
             _ => "made again: its file was changed or damaged".to_owned(),
         }
     }

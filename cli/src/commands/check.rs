@@ -75,6 +75,8 @@ struct FaultyResult<'a> {
 enum Fault {
     Damaged,
     Unreadable(io::Error),
+    /// It was written as a file, and is a link to something else.
+    Link,
     /// This file has other bytes than those that it was made from.
     Stale(String),
     /// The results of all clips that this input has now are there, and this one is of another clip.
@@ -86,6 +88,7 @@ impl fmt::Display for Fault {
         match self {
             Self::Damaged => f.write_str("its bits have changed since it was written"),
             Self::Unreadable(error) => write!(f, "cannot be read: {error}"),
+            Self::Link => f.write_str("its file was replaced by a link"),
             Self::Stale(file) => write!(f, "its {file} has changed since it was written"),
             Self::RemovedClip(input) => write!(f, "its input {input} has no such clip any more"),
         }
@@ -102,6 +105,11 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let shown = path.display();
     let folder = path.parent().unwrap_or(Path::new(""));
     let shards = RecordedPlan::read(folder)?;
+    if shards.is_none()
+        && let Some(message) = RecordedPlan::lost(folder)
+    {
+        return Err(Failure::new(DIFFERENCE, message));
+    }
     // A pipe or a device may have no end.
     let read = match std::fs::metadata(&path) {
         Ok(found) if !found.is_file() => {
@@ -275,6 +283,7 @@ fn fault(folder: &Path, entry: &ManifestEntry, inputs: &InputHashes<'_>) -> Opti
     let (bytes, sha256) = (entry.output_bytes, &entry.output_sha256);
     match digest::is_whole(folder, &entry.output, bytes, sha256) {
         Ok(true) => inputs.fault(entry),
+        _ if digest::is_link(folder, &entry.output) => Some(Fault::Link),
         Ok(false) => Some(Fault::Damaged),
         Err(error) => Some(Fault::Unreadable(error)),
     }

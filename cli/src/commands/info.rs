@@ -16,7 +16,7 @@ use tumble::{Channel, Interpolation, TrackSet};
 use tumble_formats::motion::Motion;
 use tumble_formats::printable::printable;
 use tumble_formats::robot::Robot;
-use tumble_formats::{Code, Loaded};
+use tumble_formats::{Code, Loaded, Location};
 
 use crate::arguments::input::{self, Inputs};
 use crate::arguments::interpolation::curve_warning;
@@ -118,7 +118,7 @@ struct Summary {
     metres: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     up: Option<[f64; 3]>,
-    /// The warnings about the animation's curves, and with the first one those about the whole file:
+    /// The warnings about the animation and its curves, and with the first one those about the whole file:
     /// `FILE:PLACE: warning[CODE]: …`
     warnings: Vec<String>,
 }
@@ -214,10 +214,16 @@ fn summarise(
         let animation = several.then(|| names::clip(clip));
         let clip = arguments.inputs.tracks.select(clip, &name)?;
         let mut summary = Summary::new(name.clone(), animation, &clip, &loaded);
-        // The warnings of the file are listed once.
-        if index > 0 {
-            summary.warnings.clear();
-        }
+        // Each warning is listed once.
+        let warnings = loaded.warnings.iter().filter(|warning| {
+            let animation = warning.location.as_ref().and_then(Location::animation);
+            let clips = &mut loaded.clips.iter();
+            animation
+                .and_then(|it| clips.position(|clip| clip.index == it))
+                .unwrap_or(0)
+                == index
+        });
+        summary.warnings = warnings.map(ToString::to_string).collect();
         // Keys that were added to follow the curves of a file are not meant for c2, so there is no warning about c2.
         let follows = arguments.inputs.follows_curves(path);
         let smoothest = Interpolation::from(C2);
@@ -317,7 +323,7 @@ impl Summary {
             box_length: loaded.box_length,
             metres: loaded.space.map(|space| space.metres),
             up: loaded.space.map(|space| space.up.to_array()),
-            warnings: loaded.warnings.iter().map(ToString::to_string).collect(),
+            warnings: Vec::new(),
         }
     }
 

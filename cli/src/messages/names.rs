@@ -100,10 +100,25 @@ pub(crate) fn clip(clip: &Motion) -> String {
 
 /// The title of a clip: its file and its name, if it has one.
 pub(crate) fn title(path: &Path, of_file: &Motion) -> String {
+    clip_title(&file(path), of_file)
+}
+
+/// The title of a clip of a file that is called so.
+pub(crate) fn clip_title(file: &str, of_file: &Motion) -> String {
     match of_file.name {
-        Some(_) => format!("{}: {}", file(path), clip(of_file)),
-        None => file(path),
+        Some(_) => format!("{file}: {}", clip(of_file)),
+        None => file.to_owned(),
     }
+}
+
+/// The names of some inputs in titles: those of the files; where several inputs have files of one name, with their
+/// directories.
+pub(crate) fn distinct_files(paths: &[PathBuf]) -> Vec<String> {
+    let mut names: Vec<String> = paths.iter().map(|path| file(path)).collect();
+    for index in shared_names(&names) {
+        names[index] = input(&paths[index]);
+    }
+    names
 }
 
 /// The names in messages of all clips of a file.

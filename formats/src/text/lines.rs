@@ -117,6 +117,11 @@ impl<R: BufRead> Lines<R> {
             let message = format!("the line is longer than {} bytes", self.limits.line);
             return Err(self.refuse(1, Code::LineTooLong, message));
         }
+        if !self.ended && self.buffer.last() == Some(&b'\r') {
+            // The input ends between the two bytes of its last line end, so all numbers are whole.
+            self.buffer.push(b'\n');
+            self.ended = true;
+        }
         self.strip_line_end();
         self.check_characters()?;
         match self.ended {

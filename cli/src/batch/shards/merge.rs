@@ -148,10 +148,16 @@ fn read(
 /// is changed.
 pub(crate) fn merge(folder: &Path, location: ResultLocation) -> Result<MergeSummary, Failure> {
     let shown = folder.display();
+    std::fs::read_dir(folder)
+        .map_err(|error| Failure::new(ALL_INPUTS, format!("{shown}: cannot be read: {error}")))?;
     let Some(recorded) = RecordedPlan::read(folder)? else {
-        let message =
-            format!("{shown}: has no shards to merge; `tumble eval … --shard` makes them");
-        return Err(Failure::new(ALL_INPUTS, message));
+        return Err(match RecordedPlan::lost(folder) {
+            Some(message) => Failure::new(DIFFERENCE, message),
+            None => Failure::new(
+                ALL_INPUTS,
+                format!("{shown}: has no shards to merge; `tumble eval … --shard` makes them"),
+            ),
+        });
     };
     // Two merging processes would remove each other's files, so the folder is locked.
     let opened = target::opened(folder)?;

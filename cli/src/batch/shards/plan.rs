@@ -13,13 +13,13 @@ use tumble_formats::output::{Output, remove_abandoned};
 
 use crate::arguments::input::{FoundInput, GatheredInputs};
 use crate::batch::digest::Digest;
-use crate::batch::entry::{InputEntry, kernels_sha256};
+use crate::batch::entry::{InputEntry, NAME, kernels_sha256};
 use crate::batch::owner::ReplacedOwners;
 use crate::batch::result_names::{self, ResultName, ResultNaming};
 use crate::batch::shards::record::{self, FOLDER};
 use crate::batch::target;
 use crate::messages::exit::{ALL_INPUTS, Failure};
-use crate::messages::names;
+use crate::messages::{names, words};
 
 /// The file that records the plan.
 const PLAN_FILE: &str = "plan.json";
@@ -259,6 +259,23 @@ impl RecordedPlan {
                  are at most {MAX_SHARDS} shards; remove it"
             ))),
         }
+    }
+
+    /// The message about a directory whose shards have lost the record of their plan. Where a manifest lists the
+    /// results, files of shards are what an interrupted merge left.
+    pub(crate) fn lost(folder: &Path) -> Option<String> {
+        let path = Self::path(folder);
+        let shards = record::numbers(folder).len();
+        let is_lost = shards > 0 && !path.is_symlink() && !path.exists();
+        let is_merged = || std::fs::symlink_metadata(folder.join(NAME)).is_ok();
+        (is_lost && !is_merged()).then(|| {
+            format!(
+                "{}: is missing, and there are files of {}; `tumble eval … --shard 1/1 --resume`, with the same \
+                 inputs and options, writes it again and keeps the results that are complete",
+                path.display(),
+                words::count(shards, "shard")
+            )
+        })
     }
 
     /// Writes the record completely; it may replace the same one of another process.

@@ -79,10 +79,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
             let shrink = arguments.shrink as usize;
             sections.extend(match kind {
                 WorkloadKind::Smooth => smooth::measure(shrink, repetitions)?,
-                WorkloadKind::Characters => {
-                    let section = characters::measure(shrink, &devices, repetitions);
-                    vec![section.map_err(|error| Failure::new(DEVICE, error.to_string()))?]
-                }
+                WorkloadKind::Characters => characters::measure(shrink, &devices, repetitions)
+                    .map_err(|error| Failure::new(DEVICE, error.to_string()))?,
                 WorkloadKind::Poses => poses::measure(shrink, repetitions)
                     .map_err(|error| crate::arguments::device::refused(&error))?,
                 _ => files::measure(shrink, repetitions)?,

@@ -149,8 +149,9 @@ impl Section {
     }
 
     /// `rows`: the naive peer first.
-    pub(crate) fn of_characters(rotations: usize, rows: Vec<BenchRow>) -> Self {
-        Self::with(WorkloadKind::Characters, "slerp", rotations, rows, &LOOPS)
+    pub(crate) fn of_characters(output: &str, rotations: usize, rows: Vec<BenchRow>) -> Self {
+        let label = format!("slerp, {output}");
+        Self::with(WorkloadKind::Characters, label, rotations, rows, &LOOPS)
     }
 
     /// `rows`: copying first.

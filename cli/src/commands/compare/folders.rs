@@ -69,7 +69,8 @@ pub(super) fn run(arguments: &Arguments, folders: [&Path; 2]) -> Result<(), Fail
         .or(arguments.table.set_option())
     {
         return Err(Failure::usage(format!(
-            "{option} is for the joints of two files, and two directories are compared; leave it out"
+            "{option} is for the joints of two files, and two directories are compared; leave it out (--json lists all \
+             pairs of files)"
         )));
     }
     let mut by_name: BTreeMap<PathBuf, [Option<PathBuf>; 2]> = BTreeMap::new();
@@ -81,13 +82,13 @@ pub(super) fn run(arguments: &Arguments, folders: [&Path; 2]) -> Result<(), Fail
     let paths: Vec<&PathBuf> = by_name.values().flatten().flatten().collect();
     arguments.inputs.check_formats(&paths)?;
     let mut report = FolderDifference {
-        inputs: folders.map(names::input),
+        inputs: folders.map(names::recorded),
         pairs: Vec::new(),
         missing: Default::default(),
     };
     let mut pairs = Vec::new();
     for (name, found) in &by_name {
-        let name = names::input(name);
+        let name = names::recorded(name);
         match found {
             [Some(first), Some(second)] => pairs.push((name, [&**first, &**second])),
             [Some(_), None] => report.missing[0].push(name),
@@ -95,7 +96,7 @@ pub(super) fn run(arguments: &Arguments, folders: [&Path; 2]) -> Result<(), Fail
         }
     }
     if pairs.is_empty() {
-        let [first, second] = &report.inputs;
+        let [first, second] = folders.map(names::input);
         let message = format!(
             "no file of {first} has the relative name of a file of {second}; to compare two files of other names, \
              name both"
@@ -257,7 +258,7 @@ impl FolderDifference {
                 let first = printable(first);
                 let _ = write!(text, "\n{count} only in {}: {first}", printable(folder));
                 if files.len() > 1 {
-                    text.push_str(" …");
+                    text.push_str(" … (--json lists all)");
                 }
             }
         }

@@ -18,7 +18,7 @@ use tumble_formats::compare::{
 use tumble_formats::motion::{Motion, ScalarKind};
 use tumble_formats::npz::open_numbers;
 use tumble_formats::trajectory::{Align, Associate, Step};
-use tumble_formats::{Diagnostic, Format};
+use tumble_formats::{Code, Diagnostic, Format};
 
 use crate::arguments::input::{self, Inputs};
 use crate::arguments::output::one_of;
@@ -199,18 +199,56 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     if let Some(folders) = folders::named(&arguments.inputs) {
         return folders::run(arguments, folders);
     }
+    if !arguments.inputs.has_list() {
+        check_kinds(&arguments.inputs)?;
+    }
     let inputs = arguments.inputs.with_repeats()?;
     let [first, second] = &inputs[..] else {
-        return Err(Failure::usage(format!(
-            "two files or two directories are compared, not {}",
-            words::count(inputs.len(), "file")
-        )));
+        return Err(not_two(&words::count(inputs.len(), "file")));
     };
     let paths = [first.as_path(), second.as_path()];
     arguments.check_table(paths)?;
     let (report, rest) = arguments.compared(paths)?;
     arguments.print(&report)?;
     arguments.judge(&report).and(rest)
+}
+
+/// Refuses a directory beside anything but another one. Otherwise the files in it would be counted as inputs.
+fn check_kinds(inputs: &Inputs) -> Result<(), Failure> {
+    let paths = inputs.named_paths();
+    let (directories, others): (Vec<_>, Vec<_>) = paths.iter().partition(|path| path.is_dir());
+    let Some(directory) = directories.first() else {
+        return Ok(());
+    };
+    for path in others.iter().filter(|path| !names::is_standard(path)) {
+        path.metadata().map_err(|error| {
+            let message = format!("cannot be read: {error}");
+            let fault = Diagnostic::new(names::input(path), Code::Open, message);
+            Failure::input(&fault, "")
+        })?;
+    }
+    if let ([_], [other]) = (&*directories, &*others) {
+        return Err(Failure::usage(format!(
+            "two files or two directories are compared, but {} is a directory and {} is none",
+            names::input(directory),
+            names::input(other)
+        )));
+    }
+    let mut counts = match directories.len() {
+        1 => "1 directory".to_owned(),
+        count => format!("{count} directories"),
+    };
+    if !others.is_empty() {
+        counts = format!("{counts} and {}", words::count(others.len(), "file"));
+    }
+    Err(not_two(&counts))
+}
+
+/// The refusal of inputs that are not two.
+fn not_two(counts: &str) -> Failure {
+    Failure::usage(format!(
+        "two files or two directories are compared, not {counts}"
+    ))
 }
 
 impl Arguments {
@@ -332,7 +370,8 @@ impl Arguments {
             (&*names[0], &first.clip, tracks[0]),
             (&*names[1], &second.clip, tracks[1]),
         ];
-        let found = PathDifference::of(&engine, clips, &measure).map_err(refused)?;
+        let mut found = PathDifference::of(&engine, clips, &measure).map_err(refused)?;
+        found.inputs = paths.map(names::recorded);
         found.warnings.iter().for_each(|it| words::warning(it));
         Ok((found, first.rest.and(second.rest)))
     }
@@ -395,11 +434,13 @@ impl Arguments {
         let mut found = Vec::new();
         for (index, first) in loaded[0].clips.iter().enumerate() {
             let second = &loaded[1].clips[partner[index]];
-            let names =
+            let of_clips = |name: fn(&Path) -> String| {
                 [(paths[0], first), (paths[1], second)].map(|(path, clip)| match counts[0] {
-                    1 => names::input(path),
-                    _ => format!("{} {}", names::input(path), names::clip(clip)),
-                });
+                    1 => name(path),
+                    _ => format!("{} {}", name(path), names::clip(clip)),
+                })
+            };
+            let names = of_clips(names::input);
             let inputs = [&*names[0], &names[1]];
             let selected = [
                 self.select(first, inputs[0])?,
@@ -419,7 +460,9 @@ impl Arguments {
                 clips,
                 offset,
             };
-            found.push(self.differences(&engine, pair)?);
+            let mut differences = self.differences(&engine, pair)?;
+            differences.inputs = of_clips(names::recorded);
+            found.push(differences);
         }
         Ok((found, rest))
     }

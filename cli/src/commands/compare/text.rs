@@ -14,8 +14,8 @@ use crate::messages::words;
 pub(super) fn of_clips(difference: &ClipDifference, table: TableArguments) -> String {
     let mut text = format!(
         "{} and {}: {} × {} from {} to {} s\n",
-        difference.inputs[0],
-        difference.inputs[1],
+        printable(&difference.inputs[0]),
+        printable(&difference.inputs[1]),
         words::count(difference.tracks, "track"),
         words::count(difference.samples, "sample"),
         words::seconds(difference.span[0]),
@@ -64,7 +64,7 @@ pub(super) fn of_clips(difference: &ClipDifference, table: TableArguments) -> St
         if !missing.is_empty() {
             text += &format!(
                 "  only in {}: {}\n",
-                difference.inputs[side],
+                printable(&difference.inputs[side]),
                 printable(&missing.join(", "))
             );
         }

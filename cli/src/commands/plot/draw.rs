@@ -133,10 +133,27 @@ fn text_width(text: &str, style: FontStyle) -> f64 {
     size.map_or(0.0, |(width, _)| f64::from(width) / 100.0)
 }
 
-/// The height of letters with which a panel's title fits into a width, in the pixels of SVG.
-fn title_height(title: &str, width: f64) -> f64 {
-    let needed = text_width(title, FontStyle::Bold);
-    PANEL_TITLE.min(width / needed.max(1.0))
+/// A text that is no wider than `width`, in the pixels of SVG, and the height of its letters: up to `largest`, and no
+/// less than can be read. The beginning of a text that is too long for that is left out, because the end tells similar
+/// names apart.
+fn fitted(text: &str, style: FontStyle, largest: f64, width: f64) -> (String, f64) {
+    /// Smaller letters cannot be read.
+    const SMALLEST: f64 = 8.0;
+    let height = |text: &str| largest.min(width / text_width(text, style).max(1.0));
+    let count = text.chars().count();
+    // No font has letters that are narrower on average than a fifth of their height.
+    let mut dropped = count.saturating_sub((5.0 * width / SMALLEST) as usize);
+    loop {
+        let kept = match dropped {
+            0 => text.to_owned(),
+            _ => format!("…{}", text.chars().skip(dropped).collect::<String>()),
+        };
+        let height = height(&kept);
+        if height >= SMALLEST || dropped == count {
+            return (kept, height);
+        }
+        dropped += 1;
+    }
 }
 
 fn legend_lines(figure: &Figure, width: f64) -> usize {
@@ -187,11 +204,16 @@ impl Brush {
         font.color(&rgb(colour))
     }
 
-    /// How a panel's title is written: no wider than the panel.
-    fn title<DB: DrawingBackend>(&self, title: &str, area: &Area<'_, DB>) -> TextStyle<'static> {
+    /// A panel's title, and its letters: no wider than the panel.
+    fn title<DB: DrawingBackend>(
+        &self,
+        title: &str,
+        area: &Area<'_, DB>,
+    ) -> (String, TextStyle<'static>) {
         let (width, _) = area.dim_in_pixel();
         let room = f64::from(width) / self.scale - MARGIN;
-        self.text(title_height(title, room), FontStyle::Bold, INK)
+        let (title, height) = fitted(title, FontStyle::Bold, PANEL_TITLE, room);
+        (title, self.text(height, FontStyle::Bold, INK))
     }
 
     fn figure<DB: DrawingBackend>(
@@ -201,12 +223,16 @@ impl Brush {
     ) -> Result<(), DrawingAreaErrorKind<DB::ErrorType>> {
         canvas.fill(&WHITE)?;
         let left = self.px(MARGIN);
-        let title = self.text(18.0, FontStyle::Bold, INK);
-        canvas.draw_text(&figure.title, &title, (left, self.px(12.0)))?;
-        let subtitle = self.text(12.0, FontStyle::Normal, PALE);
-        canvas.draw_text(&figure.subtitle, &subtitle, (left, self.px(34.0)))?;
         let (width, height) = canvas.dim_in_pixel();
         let nominal = f64::from(width) / self.scale;
+        for (text, style, largest, colour, top) in [
+            (&figure.title, FontStyle::Bold, 18.0, INK, 12.0),
+            (&figure.subtitle, FontStyle::Normal, 12.0, PALE, 34.0),
+        ] {
+            let (text, size) = fitted(text, style, largest, nominal - 2.0 * MARGIN);
+            let style = self.text(size, style, colour);
+            canvas.draw_text(&text, &style, (left, self.px(top)))?;
+        }
         for (entry, (left, line)) in figure.legend.iter().zip(legend_positions(figure, nominal)) {
             self.entry(canvas, entry, left, 70.0 + 22.0 * line as f64)?;
         }
@@ -271,8 +297,9 @@ impl Brush {
         x: &PlotAxis,
         y: &PlotAxis,
     ) -> Result<(), DrawingAreaErrorKind<DB::ErrorType>> {
+        let (title, style) = self.title(&panel.title, area);
         let mut chart = ChartBuilder::on(area)
-            .caption(&panel.title, self.title(&panel.title, area))
+            .caption(title, style)
             .margin(self.px(6.0))
             .margin_right(self.px(14.0))
             .x_label_area_size(self.px(34.0))
@@ -357,8 +384,9 @@ impl Brush {
         let room = f64::from(self.px(24.0));
         let aspect = f64::from(width) / (f64::from(height) - room).max(1.0);
         let (x, y) = (1.1 * aspect.max(1.0), 1.1 * (1.0 / aspect).max(1.0));
+        let (title, style) = self.title(&panel.title, area);
         let mut chart = ChartBuilder::on(area)
-            .caption(&panel.title, self.title(&panel.title, area))
+            .caption(title, style)
             .build_cartesian_2d(-x..x, -y..y)?;
         self.contents(&mut chart, panel)
     }
@@ -436,16 +464,23 @@ mod tests {
         }
     }
 
-    /// Would catch a title that runs into the panel beside it.
+    /// Would catch a title that runs into the panel beside it, or out of the picture.
     #[test]
-    fn a_long_title_is_written_smaller() {
+    fn a_long_title_is_written_smaller_and_then_without_its_beginning() {
         plotters::style::register_font(FONT, FontStyle::Bold, dejavu::sans::bold())
             .map_err(|_| "the font is refused")
             .unwrap();
-        assert_eq!(title_height("hips: dimensions 1 to 4", 384.0), PANEL_TITLE);
-        let long = format!("…{}: dimensions 121 to 124", "M".repeat(27));
-        let height = title_height(&long, 384.0);
-        assert!((8.0..PANEL_TITLE).contains(&height), "{height}");
-        assert!(height * text_width(&long, FontStyle::Bold) <= 384.0);
+        let fitted = |title: &str| fitted(title, FontStyle::Bold, PANEL_TITLE, 384.0);
+        let short = "hips: dimensions 1 to 4";
+        assert_eq!(fitted(short), (short.to_owned(), PANEL_TITLE));
+        for (letters, is_whole) in [(28, true), (60, false), (100_000, false)] {
+            let long = format!("{}: dimensions 121 to 124", "M".repeat(letters));
+            let (shown, height) = fitted(&long);
+            assert!((8.0..PANEL_TITLE).contains(&height), "{height}");
+            assert!(height * text_width(&shown, FontStyle::Bold) <= 384.0 + 1e-9);
+            assert_eq!(shown == long, is_whole, "{shown}");
+            assert_eq!(shown.starts_with("…M"), !is_whole, "{shown}");
+            assert!(shown.ends_with("M: dimensions 121 to 124"), "{shown}");
+        }
     }
 }

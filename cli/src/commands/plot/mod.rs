@@ -216,6 +216,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         out,
         overwrite: arguments.overwrite,
         stems: names::distinct_stems(&inputs),
+        titles: names::distinct_files(&inputs),
         inputs: inputs.clone(),
         drawn: Vec::new(),
     };
@@ -226,7 +227,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         let name = names::input(path);
         let stem = writer.stem(path);
         if let Some((source, makers, rest)) = arguments.bodies(path)? {
-            let title = (&*name, names::file(path));
+            let title = (&*name, writer.title(path));
             let figure = path::figure(&mut writer.device, title, &source, &makers)?;
             let file = format!("{stem}-path.{}", writer.format.extension());
             return writer.draw(&figure, &file, path).and(rest);
@@ -234,7 +235,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         let input::OnlyClip { clip, rest, .. } = arguments.inputs.load_one(path)?;
         let choices = arguments.choices(&name, &clip)?;
         note_curves(&name, &clip, &choices);
-        let source = PlotSource::new(names::title(path, &clip), &clip, &choices, &samples)?;
+        let title = names::clip_title(&writer.title(path), &clip);
+        let source = PlotSource::new(title, &clip, &choices, &samples)?;
         let subjects = match arguments.show() {
             PlotQuantity::Scalars => arguments.scalars(&clip, &name)?,
             _ => {
@@ -506,6 +508,8 @@ pub(crate) struct FigureWriter {
     inputs: Vec<PathBuf>,
     /// The names of the pictures of each input.
     stems: Vec<String>,
+    /// The name of each input in titles.
+    titles: Vec<String>,
     drawn: Vec<DrawnFile>,
 }
 
@@ -524,6 +528,12 @@ impl FigureWriter {
     fn stem(&self, path: &Path) -> String {
         let index = self.inputs.iter().position(|input| input == path);
         index.map_or_else(|| names::stem(path), |index| self.stems[index].clone())
+    }
+
+    /// The name of an input in titles.
+    fn title(&self, path: &Path) -> String {
+        let index = self.inputs.iter().position(|input| input == path);
+        index.map_or_else(|| names::file(path), |index| self.titles[index].clone())
     }
 
     /// Draws a figure of an input.

@@ -16,7 +16,7 @@ use crate::commands::plot::source::curves::{NAMES, PlotSubject, box_name};
 use crate::commands::plot::source::{PlotSamples, PlotSource};
 use crate::commands::plot::subjects::{PANELS, moving_boxes};
 use crate::commands::plot::{Arguments, FigureWriter, note_curves};
-use crate::messages::drawn::check_has_tracks;
+use crate::messages::drawn::{check_has_tracks, note_scalars};
 use crate::messages::exit::Failure;
 use crate::messages::progress::Progress;
 use crate::messages::{names, words};
@@ -54,6 +54,7 @@ pub(crate) fn write(
         for (clip, file) in loaded.clips.iter().zip(files) {
             let name = names::input(path);
             check_has_tracks(&name, clip, "--show scalars draws them, without --report")?;
+            note_scalars(&name, clip);
             let choices = arguments.choices(&name, clip)?;
             note_curves(&name, clip, &choices);
             let mut boxes = moving_boxes(&clip.set, &name);
@@ -63,7 +64,7 @@ pub(crate) fn write(
                 _ => format!("{}.{file}", writer.stem(path)),
             };
             let chapter = Chapter {
-                title: names::title(path, clip),
+                title: names::clip_title(&writer.title(path), clip),
                 facts: facts(clip),
                 figures: figures(
                     writer,
@@ -103,7 +104,7 @@ fn figures(
     samples: &PlotSamples,
     progress: &mut Progress,
 ) -> Result<Vec<ReportFigure>, Failure> {
-    let name = names::title(path, clip);
+    let name = names::clip_title(&writer.title(path), clip);
     let mut shown = Vec::new();
     let mut draw =
         |writer: &mut FigureWriter, methods, label: &str, caption, subject: &PlotSubject| {
