@@ -444,7 +444,13 @@ fn a_check_finds_changed_files_of_options() {
         line(folder, &batch);
         line(folder, &format!("check {option}"));
         fs::remove_file(folder.join(file)).unwrap();
-        line(folder, &format!("check {option}"));
+        let absent = run(folder, &["check", option]);
+        let words = format!("1 input file not found (the first: {file})");
+        assert!(
+            absent.code == 8 && absent.words.contains(&words),
+            "{}",
+            absent.words
+        );
     }
 }
 
