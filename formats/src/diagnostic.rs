@@ -239,7 +239,7 @@ codes! {
     TableDamaged = "E401", "a table that cannot be read", "The file is truncated or damaged, or uses a feature that is not supported; the message gives the reason. Rows are counted from 0.";
     TableClaims = "E402", "more than the file can contain", "The file states more rows or bytes than its length can contain; nothing was read.";
     Compression = "E403", "a compression that is not read", "Parquet is read uncompressed and with snappy, zstd and LZ4, Arrow uncompressed and with zstd and LZ4.";
-    NoRotations = "E404", "no rotations among the columns", "Rotations are the columns `x y z w` (a row for each key), `knee.x knee.y knee.z knee.w` (a row for each time), or a part of a list that --map names.";
+    NoRotations = "E404", "no rotations among the columns", "Rotations are the columns `x y z w` (a row for each key), `knee.x knee.y knee.z knee.w` (a row for each time), or a part of a list that --map names. A table of numbers without rotations, such as the angles of joints, is read by `--map knee=COLUMN:scalar:angle` (radians; `:deg` for degrees), or `:scalar` for other numbers.";
     NoTimes = "E405", "no times among the columns", "Times are a column `time`, `timestamp` or `t`, or `frame_index` with --source-fps; --map time=NAME names another. In CSV, commas separate columns, and the first line names them.";
     ColumnMissing = "E406", "a column is missing", "A column that `--map` names does not exist, or a group of columns such as `tx ty tz` is not complete.";
     ColumnTwice = "E407", "two columns of one name", "It is not clear which of them is meant; rename one.";

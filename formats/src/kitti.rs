@@ -8,6 +8,7 @@ use std::path::Path;
 
 use glam::{DMat3, DQuat, DVec3};
 use tumble::FrameRate;
+use tumble::names::counted;
 
 use crate::decimal::{Decimal, decimal_count};
 use crate::diagnostic::{Code, Diagnostic};
@@ -155,8 +156,9 @@ pub fn read_kitti(
         (Some(found), _) => {
             if found.times.len() != count {
                 let message = format!(
-                    "{count} poses, and {} times for them; is it another sequence's file of times?",
-                    found.times.len()
+                    "{}, and {} for them; is it another sequence's file of times?",
+                    counted(count, "pose"),
+                    counted(found.times.len(), "time")
                 );
                 return Err(Diagnostic::new(name, Code::FrameTimes, message));
             }
@@ -197,7 +199,10 @@ fn read_rows<R: BufRead>(
             _ => ", and those after the first pose",
         };
         let message =
-            format!("{found} numbers where {expected} are expected: three rows of a matrix{after}");
+            format!(
+                "{} where {expected} are expected: three rows of a matrix{after}",
+                counted(found, "number")
+            );
         return Err(lines.refuse(column, Code::KittiPose, message));
     }
     let mut rows = [[0.0; 4]; 3];
@@ -223,7 +228,9 @@ fn read_rows<R: BufRead>(
         .any(|warning| warning.code == Code::FurtherNumbers);
     if !is_known && !after.is_empty() && after != FOURTH_ROW {
         let column = tokens(line).nth(NUMBERS).map_or(1, |(at, _)| at);
-        let message = format!("{} numbers after each pose are left out", after.len());
+        let are = if after.len() == 1 { "is" } else { "are" };
+        let after = counted(after.len(), "number");
+        let message = format!("{after} after each pose {are} left out");
         lines.warn(column, Code::FurtherNumbers, message);
     }
     Ok(rows)

@@ -6,6 +6,7 @@ use std::io::{BufRead, Write};
 use std::path::Path;
 
 use glam::{DQuat, DVec3, Quat};
+use tumble::names::counted;
 use tumble::{TrackError, TrackSet};
 
 use crate::decimal::{Decimal, decimal_count, offset_of};
@@ -167,7 +168,9 @@ impl TrajectoryPoses {
     ) -> Result<(), Diagnostic> {
         let found = tokens(line).count();
         if self.columns == 0 && found > 8 && !has_decimal_commas(original) {
-            let message = format!("{} numbers after each pose are left out", found - 8);
+            let are = if found == 9 { "is" } else { "are" };
+            let after = counted(found - 8, "number");
+            let message = format!("{after} after each pose {are} left out");
             lines.warn(
                 tokens(line).nth(8).map_or(1, |(at, _)| at),
                 Code::FurtherNumbers,
@@ -186,7 +189,8 @@ impl TrajectoryPoses {
                 ""
             };
             let message = format!(
-                "{found} numbers where {columns} are expected: {}{more}",
+                "{} where {columns} are expected: {}{more}",
+                counted(found, "number"),
                 format.numbers
             );
             return Err(lines.refuse(column, Code::TumPose, message));
@@ -254,9 +258,9 @@ impl TrajectoryPoses {
                 line: self.lines[first],
                 column: 1,
             };
+            let poses = counted(gaps.len(), "pose");
             let message = format!(
-                "{} poses have numbers that are missing; the path is interpolated from the others",
-                gaps.len()
+                "{poses} with missing numbers; the path is interpolated from the others"
             );
             (Some(location), message)
         });

@@ -161,7 +161,8 @@ fn warn_of_other_units(name: &str, rate: FrameRate, poses: &WorldFrames) {
     if FrameRate::new(RATE, 1).is_ok_and(|of_set| of_set != rate) {
         words::warning(&format!(
             "{name}: HumanML3D has {RATE} frames a second, and its numbers are steps from frame to frame; these are of \
-             {rate} frames a second (--fps {RATE})"
+             {} (--fps {RATE})",
+            rate.in_words()
         ));
     }
     let first = &poses.positions[..poses.names.len().min(poses.positions.len())];

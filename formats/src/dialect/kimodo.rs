@@ -1,6 +1,7 @@
 //! Kimodo's motion: matrices and positions of all joints in the world, y up, without names, parents or a rate.
 
 use tumble::Layout;
+use tumble::names::counted;
 
 use super::{Axis, Dialect, member, missing};
 use crate::diagnostic::Code;
@@ -63,7 +64,8 @@ pub(super) static DIALECT: Dialect = Dialect {
             None => {
                 warnings.warn(Code::UnnamedJoints, || {
                     let message = format!(
-                        "the file does not name its {count} joints; they are called joint_0, joint_1 …, and are in the world"
+                        "the file does not name its {}; they are called joint_0, joint_1 …, and are in the world",
+                        counted(count, "joint")
                     );
                     (None, message)
                 });

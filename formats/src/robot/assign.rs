@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 use std::f64::consts::TAU;
 
 use glam::{DQuat, DVec3};
+use tumble::names::counted;
 use tumble::trees::{BodyOrder, BodyPose, JointKind, Mimic, Siblings, Tree, TreeJoint};
 use tumble::{Channel, ScalarKeys, TrackError, TrackSet};
 
@@ -415,8 +416,8 @@ fn choose(
             format!(" (and these, which follow them: {mimics})")
         });
         return Err(refuse(format!(
-            "the file has {} joints without names, and the robot {}: {}{mimics}",
-            names.len(),
+            "the file has {} without a name, and the robot {}: {}{mimics}",
+            counted(names.len(), "joint"),
             joints.len(),
             joints.join(", ")
         )));

@@ -8,6 +8,7 @@ use glam::{DVec3, Vec3};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
+use tumble::names::counted;
 use tumble::{Channel, Device, Engine, Layout};
 use tumble_formats::join::{JoinError, join};
 use tumble_formats::motion::Motion;
@@ -19,7 +20,7 @@ use tumble_formats::trim::trim;
 
 use crate::arrays::{ListArgument, Order, number};
 use crate::build::{ClipArguments, ClipKeys, KeysLayout, put_scalars, scalar_keys};
-use crate::clip::{Clip, counted};
+use crate::clip::Clip;
 use crate::clip_shape::shaped;
 use crate::engine::{default_engine, layout_named};
 use crate::errors::{guarded, in_python, input, of_engine};
