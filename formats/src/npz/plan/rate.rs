@@ -87,7 +87,7 @@ impl ArchivePlan {
                  used, --override-fps replaces it",
                 rate.in_words(),
                 counted(self.frames, "frame"),
-                clock_text(0, *seconds)
+                clock_text(0, seconds)
             )
         });
     }
