@@ -538,7 +538,10 @@ fn inputs_that_are_not_found_are_no_success() {
     assert!(check.words.contains(expected), "{}", check.words);
     let report: serde_json::Value = serde_json::from_slice(&check.out).unwrap();
     assert_eq!(report["complete"], false, "{report}");
-    assert_eq!(report["not_found"], serde_json::json!(["in/a.dat", "in/b.dat"]));
+    assert_eq!(
+        report["not_found"],
+        serde_json::json!(["in/a.dat", "in/b.dat"])
+    );
     let alone = succeed(folder, &["check", "work/out", "--results-only"]);
     assert_eq!(
         String::from_utf8(alone.out).unwrap(),

@@ -959,7 +959,8 @@ fn offsets_of_clocks_are_possible_ones() {
     let expected = "two clocks are not 1e300 s apart: expected seconds from -1e11 to 1e11";
     assert!(refused.words.contains(expected), "{}", refused.words);
     let third = succeed(folder, &[&line[..], &["0.333333333333"]].concat());
-    let expected = "a.dat from 0 to 2 s, b.dat from 0.333333 to 2.333333 s; compared from 0.333333 to 2 s";
+    let expected =
+        "a.dat from 0 to 2 s, b.dat from 0.333333 to 2.333333 s; compared from 0.333333 to 2 s";
     assert!(third.words.contains(expected), "{}", third.words);
 }
 
@@ -974,24 +975,39 @@ fn scalars_alone_are_compared() {
         std::fs::write(folder.join(name), text).unwrap();
     };
     write("one/s.csv", "knee.scalar_angle,weight.scalar_plain", "1,1");
-    write("two/s.csv", "weight.scalar_plain,knee.scalar_angle", "1,0.5");
+    write(
+        "two/s.csv",
+        "weight.scalar_plain,knee.scalar_angle",
+        "1,0.5",
+    );
     let (code, found) = json(folder, &["compare", "one/s.csv", "two/s.csv", "--json"]);
     let clip = &found["clips"][0];
     assert_eq!((code, &clip["rotation"]), (0, &Value::Null), "{found}");
-    assert_eq!((&clip["tracks"], &clip["scalar_count"]), (&0.into(), &2.into()));
+    assert_eq!(
+        (&clip["tracks"], &clip["scalar_count"]),
+        (&0.into(), &2.into())
+    );
     assert_eq!(clip["scalars"][0]["track"], "knee");
     let angle = clip["scalars"][0]["largest"].as_f64().unwrap();
     assert!((angle - 0.5f64.to_degrees()).abs() < 1e-4, "{found}");
     assert_eq!(clip["scalars"][1]["largest"], 0.0, "{found}");
     let report = succeed(folder, &["compare", "one/s.csv", "two/s.csv"]);
     let report = String::from_utf8(report.out).unwrap();
-    let expected = "one/s.csv and two/s.csv: 2 scalars × 3 samples from 0 to 1 s\n  scalar angle mean";
+    let expected =
+        "one/s.csv and two/s.csv: 2 scalars × 3 samples from 0 to 1 s\n  scalar angle mean";
     assert!(report.starts_with(expected), "{report}");
     assert!(!report.contains("rotation"), "{report}");
     let over = ["--tolerance", "1deg"];
-    let failed = run(folder, &[&["compare", "one/s.csv", "two/s.csv"], &over[..]].concat());
+    let failed = run(
+        folder,
+        &[&["compare", "one/s.csv", "two/s.csv"], &over[..]].concat(),
+    );
     assert_eq!(failed.code, 8, "{}", failed.words);
-    assert!(failed.words.contains("angle knee of 28.65°"), "{}", failed.words);
+    assert!(
+        failed.words.contains("angle knee of 28.65°"),
+        "{}",
+        failed.words
+    );
     let folders = succeed(folder, &["compare", "one", "two"]);
     let report = String::from_utf8(folders.out).unwrap();
     assert!(report.contains("s.csv: angle 28.65°\n"), "{report}");
@@ -1025,7 +1041,10 @@ fn the_largest_is_the_first_of_the_table() {
     };
     std::fs::write(folder.join("a.bvh"), body([0.0, 0.0], "0 0 0")).unwrap();
     std::fs::write(folder.join("b.bvh"), body([0.0, 1.0], "2 0 0")).unwrap();
-    let (_, found) = json(folder, &["compare", "a.bvh", "b.bvh", "--json", "--top", "1"]);
+    let (_, found) = json(
+        folder,
+        &["compare", "a.bvh", "b.bvh", "--json", "--top", "1"],
+    );
     let clip = &found["clips"][0];
     assert_eq!(clip["joints"][0]["track"], "Right", "{found}");
     assert_eq!(clip["rotation"]["track"], "Right", "{found}");
@@ -1090,9 +1109,15 @@ fn directories_are_compared_file_by_file() {
         std::fs::create_dir(folder.join(side)).unwrap();
         std::fs::write(folder.join(side).join("n.npy"), bytes).unwrap();
     }
-    let (code, found) = json(folder, &["compare", "nan", "number", "--json", "--tolerance", "1"]);
+    let (code, found) = json(
+        folder,
+        &["compare", "nan", "number", "--json", "--tolerance", "1"],
+    );
     let pair = &found["pairs"][0];
-    assert_eq!((code, &pair["number"], &pair["not_finite"]), (8, &0.0.into(), &1.into()));
+    assert_eq!(
+        (code, &pair["number"], &pair["not_finite"]),
+        (8, &0.0.into(), &1.into())
+    );
     let report = String::from_utf8(succeed(folder, &["compare", "nan", "number"]).out).unwrap();
     let expected = "n.npy: 1 number is NaN or infinite in only one\n";
     assert!(report.contains(expected), "{report}");

@@ -742,8 +742,14 @@ fn a_walk_is_mirrored() {
     assert!(made.words.contains(expected), "{}", made.words);
     assert!(!made.words.contains("W908"), "{}", made.words);
     line(folder, "convert m.bvh --mirror x -o back.bvh");
-    line(folder, "compare w.bvh back.bvh --tolerance 1e-3deg --distance 1e-4");
-    let other = run(folder, &["compare", "w.bvh", "m.bvh", "--tolerance", "1deg"]);
+    line(
+        folder,
+        "compare w.bvh back.bvh --tolerance 1e-3deg --distance 1e-4",
+    );
+    let other = run(
+        folder,
+        &["compare", "w.bvh", "m.bvh", "--tolerance", "1deg"],
+    );
     assert_eq!(other.code, 8, "{}", other.words);
     // From head to feet a body is no mirror image.
     let made = line(folder, "convert w.bvh --mirror y -o y.glb");
@@ -753,8 +759,12 @@ fn a_walk_is_mirrored() {
         "time,left_knee.scalar_angle,right_knee.scalar_angle\n0,0,0\n1,1,0\n",
     )
     .unwrap();
-    let refused = run(folder, &["convert", "s.csv", "--mirror", "y", "-o", "t.csv"]);
+    let refused = run(
+        folder,
+        &["convert", "s.csv", "--mirror", "y", "-o", "t.csv"],
+    );
     assert_eq!(refused.code, 4, "{}", refused.words);
-    let expected = "error[E916]: the axis of the joint `left_knee` is not known; give the robot (--robot)";
+    let expected =
+        "error[E916]: the axis of the joint `left_knee` is not known; give the robot (--robot)";
     assert!(refused.words.contains(expected), "{}", refused.words);
 }

@@ -198,11 +198,10 @@ fn read_rows<R: BufRead>(
             NUMBERS => "",
             _ => ", and those after the first pose",
         };
-        let message =
-            format!(
-                "{} where {expected} are expected: three rows of a matrix{after}",
-                counted(found, "number")
-            );
+        let message = format!(
+            "{} where {expected} are expected: three rows of a matrix{after}",
+            counted(found, "number")
+        );
         return Err(lines.refuse(column, Code::KittiPose, message));
     }
     let mut rows = [[0.0; 4]; 3];

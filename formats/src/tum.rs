@@ -259,9 +259,8 @@ impl TrajectoryPoses {
                 column: 1,
             };
             let poses = counted(gaps.len(), "pose");
-            let message = format!(
-                "{poses} with missing numbers; the path is interpolated from the others"
-            );
+            let message =
+                format!("{poses} with missing numbers; the path is interpolated from the others");
             (Some(location), message)
         });
         lines.warnings.append(&mut warnings.into_list());

@@ -46,7 +46,9 @@ fn body(rest: impl Fn(usize) -> DQuat) -> Motion {
         if joint == 0 || joint == 2 {
             let moved = |key: usize| (offset + turn(key + 40).xyz()).as_vec3();
             let moved: Vec<Vec3> = (0..3).map(moved).collect();
-            clip.set.set_translations(joint, &TIMES, &moved, &[]).unwrap();
+            clip.set
+                .set_translations(joint, &TIMES, &moved, &[])
+                .unwrap();
         }
         clip.skeleton.push(Joint {
             parent,
@@ -64,7 +66,9 @@ fn poses(clip: &Motion) -> Vec<WorldPose> {
     let engine = Engine::new(Device::Cpu).unwrap();
     // Between the keys too.
     let times = SampleTimes::at(vec![0.0, 0.3, 0.5, 0.8, 1.0]);
-    let samples = ChannelMethods::AUTHORED.sample(&engine, clip, &times).unwrap();
+    let samples = ChannelMethods::AUTHORED
+        .sample(&engine, clip, &times)
+        .unwrap();
     world(clip, &samples).unwrap()
 }
 
@@ -80,7 +84,10 @@ fn joints_are_where_their_partners_were_in_the_mirror() {
         let clip = body(rest);
         let (result, report) = mirrored(&clip, ACROSS_X).unwrap();
         assert_eq!(report.alone, ["hips"]);
-        assert_eq!(report.pairs[1], ["left_foot", "right_foot"].map(str::to_owned));
+        assert_eq!(
+            report.pairs[1],
+            ["left_foot", "right_foot"].map(str::to_owned)
+        );
         assert!(report.asymmetry.unwrap().1 < 1e-6);
         let partners = mirror_pairs(&NAMES);
         let (before, after) = (poses(&clip), poses(&result));
@@ -108,7 +115,9 @@ fn joints_are_where_their_partners_were_in_the_mirror() {
             };
             if index == 0 {
                 let bits = |keys: &[Quat]| -> Vec<[u32; 4]> {
-                    keys.iter().map(|q| q.to_array().map(f32::to_bits)).collect()
+                    keys.iter()
+                        .map(|q| q.to_array().map(f32::to_bits))
+                        .collect()
                 };
                 assert_eq!(bits(&one), bits(&two));
             }
@@ -154,21 +163,29 @@ fn bodies_of_robots_are_mirrored() {
     let root = turn(3).as_quat();
     clip.set.push("root", &[0.0], &[root]).unwrap();
     let position = Vec3::new(0.3, 0.2, 0.9);
-    clip.set.set_translations(0, &[0.0], &[position], &[]).unwrap();
+    clip.set
+        .set_translations(0, &[0.0], &[position], &[])
+        .unwrap();
     for (index, joint) in tree.scalar_joints().enumerate() {
         let number = 0.1 + 0.07 * index as f32;
         let kind = match joint.name.ends_with("slide") {
             true => ScalarKind::Length,
             false => ScalarKind::Angle,
         };
-        clip.set.push_scalar(&joint.name, &[0.0], &[number], &[]).unwrap();
+        clip.set
+            .push_scalar(&joint.name, &[0.0], &[number], &[])
+            .unwrap();
         clip.scalars.push(Scalar {
             kind,
             ..Scalar::default()
         });
     }
-    clip.set.push_scalar("left_foot.contact", &[0.0], &[1.0], &[]).unwrap();
-    clip.set.push_scalar("right_foot.contact", &[0.0], &[0.0], &[]).unwrap();
+    clip.set
+        .push_scalar("left_foot.contact", &[0.0], &[1.0], &[])
+        .unwrap();
+    clip.set
+        .push_scalar("right_foot.contact", &[0.0], &[0.0], &[])
+        .unwrap();
     for _ in 0..2 {
         clip.scalars.push(Scalar {
             kind: ScalarKind::Contact,
@@ -206,7 +223,11 @@ fn bodies_of_robots_are_mirrored() {
         let apart = (pose.position - mirrored_point(other.position, 1)).length();
         assert!(apart < 1e-6, "{} {apart}", names[body]);
         let expected = mirrored_rotation(other.rotation, 1);
-        assert!(pose.rotation.dot(expected).abs() > 1.0 - 1e-12, "{}", names[body]);
+        assert!(
+            pose.rotation.dot(expected).abs() > 1.0 - 1e-12,
+            "{}",
+            names[body]
+        );
     }
     let (twice, _) = mirrored(&result, mirror).unwrap();
     for index in 0..clip.set.scalar_count() {

@@ -338,7 +338,11 @@ impl<'a> AbsentFiles<'a> {
         let mut texts = Vec::new();
         if let Some(first) = self.orphans.first() {
             let results = words::count(self.orphans.len(), "result");
-            let have = if self.orphans.len() == 1 { "has" } else { "have" };
+            let have = if self.orphans.len() == 1 {
+                "has"
+            } else {
+                "have"
+            };
             let first = &first.output;
             texts.push(format!(
                 "{results} {have} no input any more (the first: {first})"

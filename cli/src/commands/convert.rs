@@ -166,7 +166,10 @@ impl Arguments {
                 MirrorError::Axes { .. } => " (--mirror)",
                 _ => "",
             };
-            Failure::input(&Diagnostic::new(name, Code::Mirror, error.to_string()), hint)
+            Failure::input(
+                &Diagnostic::new(name, Code::Mirror, error.to_string()),
+                hint,
+            )
         })?;
         if let Some((joint, apart)) = report.asymmetry.filter(|(_, apart)| *apart > SYMMETRIC) {
             let message = format!(

@@ -65,15 +65,18 @@ pub fn kimodo(
     let rows = rows.map(|(frame, (joints, rotations))| {
         // The last frame repeats the velocity before it.
         let first = frame.min(frames - 2);
-        let velocity = |joint: usize| {
-            (positions[first + 1][joint] - positions[first][joint]) * per_second
-        };
+        let velocity =
+            |joint: usize| (positions[first + 1][joint] - positions[first][joint]) * per_second;
         let root = smooth[frame];
         let across = on_ground(joints[RIGHT_HIP] - joints[LEFT_HIP]);
         let heading = DVec2::new(-across.x, across.y).try_normalize();
         let mut row = vec![root.x, joints[0].y, root.y];
         row.extend(heading.unwrap_or(DVec2::X).to_array());
-        row.extend(joints.iter().flat_map(|joint| [joint.x - root.x, joint.y, joint.z - root.y]));
+        row.extend(
+            joints
+                .iter()
+                .flat_map(|joint| [joint.x - root.x, joint.y, joint.z - root.y]),
+        );
         row.extend(rotations.iter().flat_map(|&it| six(it, SixOrder::Columns)));
         row.extend((0..joints.len()).flat_map(|joint| velocity(joint).to_array()));
         let [at, speeds] = [FEET.map(|joint| joints[joint]), FEET.map(velocity)];
@@ -276,13 +279,20 @@ mod tests {
             let product = |row: usize| {
                 let of = |row: usize| acceleration(row);
                 let before = if row > 0 { of(row - 1) } else { DVec2::ZERO };
-                let after = if row + 1 < frames { of(row + 1) } else { DVec2::ZERO };
+                let after = if row + 1 < frames {
+                    of(row + 1)
+                } else {
+                    DVec2::ZERO
+                };
                 2.0 * of(row) - before - after + system.weight * found[row]
             };
             let mut right: Vec<DVec2> = (0..frames).map(product).collect();
             system.solve(&mut right);
             for (found, right) in found.iter().zip(&right) {
-                assert!((*found - *right).length() < 1e-12, "{frames}: {found} {right}");
+                assert!(
+                    (*found - *right).length() < 1e-12,
+                    "{frames}: {found} {right}"
+                );
             }
         }
     }

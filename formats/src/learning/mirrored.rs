@@ -40,7 +40,9 @@ pub struct MirrorReport {
 #[non_exhaustive]
 pub enum MirrorError {
     /// Two joints of the same name but for the side have parents that are no such pair.
-    #[error("`{joint}` is mirrored to `{partner}`, but the parent of one is not the partner of the other's parent")]
+    #[error(
+        "`{joint}` is mirrored to `{partner}`, but the parent of one is not the partner of the other's parent"
+    )]
     Parents {
         /// A joint.
         joint: String,
@@ -48,7 +50,9 @@ pub enum MirrorError {
         partner: String,
     },
     /// A joint has a scale that differs by axis, and its axes at rest are not those of its partner.
-    #[error("`{joint}` has a scale that differs by axis, and its axes are not the mirror image of its partner's")]
+    #[error(
+        "`{joint}` has a scale that differs by axis, and its axes are not the mirror image of its partner's"
+    )]
     Scale {
         /// The joint.
         joint: String,
@@ -60,7 +64,9 @@ pub enum MirrorError {
         joint: String,
     },
     /// Two joints turn or move along axes that are no mirror images.
-    #[error("the joints `{joint}` and `{partner}` do not move along mirrored axes; is the axis from left to right another?")]
+    #[error(
+        "the joints `{joint}` and `{partner}` do not move along mirrored axes; is the axis from left to right another?"
+    )]
     Axes {
         /// A joint.
         joint: String,
@@ -97,10 +103,7 @@ const AXES: f64 = 1e-3;
 /// # Errors
 /// When the parents of partners are no partners, when the axes of a robot's joints are not known or no mirror images, or
 /// when a mirrored key is not valid.
-pub fn mirrored(
-    clip: &Motion,
-    mirror: Mirror<'_>,
-) -> Result<(Motion, MirrorReport), MirrorError> {
+pub fn mirrored(clip: &Motion, mirror: Mirror<'_>) -> Result<(Motion, MirrorReport), MirrorError> {
     let axis = mirror.axis;
     let names: Vec<String> = (0..clip.set.track_count())
         .map(|track| clip.set.track_name(track))
@@ -189,7 +192,8 @@ pub fn mirrored(
             let tangents = moved.tangents.iter();
             let tangents =
                 tangents.map(|both| both.map(|it| frames.vector(it.as_dvec3()).as_vec3()));
-            let (keys, tangents): (Vec<Vec3>, Vec<[Vec3; 2]>) = (keys.collect(), tangents.collect());
+            let (keys, tangents): (Vec<Vec3>, Vec<[Vec3; 2]>) =
+                (keys.collect(), tangents.collect());
             result
                 .set
                 .set_translations(joint, moved.times, &keys, &tangents)?;
@@ -213,7 +217,11 @@ pub fn mirrored(
         };
         let numbers: Vec<f32> = keys.keys.iter().map(|&key| change.number(key)).collect();
         let sign = change.sign as f32;
-        let tangents: Vec<[f32; 2]> = keys.tangents.iter().map(|it| it.map(|it| sign * it)).collect();
+        let tangents: Vec<[f32; 2]> = keys
+            .tangents
+            .iter()
+            .map(|it| it.map(|it| sign * it))
+            .collect();
         let scalar = Scalar {
             origin: change.sign * from.origin,
             interpolation: from.interpolation,
@@ -252,7 +260,13 @@ fn mutual(partners: Vec<usize>) -> Vec<usize> {
     let is_pair = |joint: usize| partners[partners[joint]] == joint;
     let joints = 0..partners.len();
     joints
-        .map(|joint| if is_pair(joint) { partners[joint] } else { joint })
+        .map(|joint| {
+            if is_pair(joint) {
+                partners[joint]
+            } else {
+                joint
+            }
+        })
         .collect()
 }
 
@@ -325,7 +339,11 @@ impl RestPose {
         }
         Ok(Self {
             rotations,
-            positions: if root.is_some() { positions } else { Vec::new() },
+            positions: if root.is_some() {
+                positions
+            } else {
+                Vec::new()
+            },
             root: root.unwrap_or_default(),
         })
     }
@@ -351,7 +369,10 @@ fn asymmetry(
 ) -> Option<(usize, f64)> {
     let away = |joint: usize| positions[joint] - root;
     let joints = 0..positions.len();
-    let size = joints.clone().map(|joint| away(joint).length()).fold(0.0, f64::max);
+    let size = joints
+        .clone()
+        .map(|joint| away(joint).length())
+        .fold(0.0, f64::max);
     let apart = |joint: usize| (mirrored_point(away(partners[joint]), axis) - away(joint)).length();
     let worst = joints.max_by(|&a, &b| apart(a).total_cmp(&apart(b)))?;
     (size > 0.0).then(|| (worst, apart(worst) / size))
@@ -414,7 +435,9 @@ impl<'a> RobotAtRest<'a> {
     fn joint(&self, name: &str) -> Result<(&'a TreeJoint, DVec3), MirrorError> {
         let bodies = self.tree.bodies().iter().zip(&self.rotations);
         let mut joints = bodies.flat_map(|(body, rotation)| {
-            body.joints.iter().map(move |joint| (joint, *rotation * joint.axis))
+            body.joints
+                .iter()
+                .map(move |joint| (joint, *rotation * joint.axis))
         });
         let found = joints.find(|(joint, _)| joint.name == name);
         found.ok_or_else(|| MirrorError::NoAxis {

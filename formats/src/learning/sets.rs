@@ -110,7 +110,9 @@ pub struct FeatureArray {
 #[non_exhaustive]
 pub enum FeatureError {
     /// A set needs joints that the skeleton does not have.
-    #[error("{set} needs the 22 joints of SMPL, and the joints are not those of a known human skeleton")]
+    #[error(
+        "{set} needs the 22 joints of SMPL, and the joints are not those of a known human skeleton"
+    )]
     NoJoints {
         /// The name of the set.
         set: &'static str,

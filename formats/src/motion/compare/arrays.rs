@@ -127,7 +127,10 @@ mod tests {
 
     #[test]
     fn numbers_without_a_difference_are_counted() {
-        let first = numbers(&[5], &[f64::NAN, f64::INFINITY, 1.0, f64::NAN, f64::INFINITY]);
+        let first = numbers(
+            &[5],
+            &[f64::NAN, f64::INFINITY, 1.0, f64::NAN, f64::INFINITY],
+        );
         let second = numbers(&[5], &[f64::NAN, f64::INFINITY, 1.5, 2.0, 3.0]);
         let found = ArrayDifference::of(["a", "b"], [&first, &second]).unwrap();
         assert_eq!((found.differing, found.not_finite), (3, 2));

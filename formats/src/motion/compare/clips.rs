@@ -168,10 +168,12 @@ fn worst(joints: &[JointDifference], channels: [ChannelOf; 2]) -> Option<(&str, 
     let key = |joint: &JointDifference| {
         channels.map(|channel| channel(joint).map_or(0.0, |it| it.spread.largest))
     };
-    let joint = joints.iter().reduce(|worst, joint| match key(joint) > key(worst) {
-        true => joint,
-        false => worst,
-    })?;
+    let joint = joints
+        .iter()
+        .reduce(|worst, joint| match key(joint) > key(worst) {
+            true => joint,
+            false => worst,
+        })?;
     Some((&joint.track, channels[0](joint)?))
 }
 
@@ -466,12 +468,12 @@ impl ClipPair<'_> {
             });
             let each: Vec<ScalarDifference> = each.collect();
             let largest = |scalar: &ScalarDifference| scalar.difference.spread.largest;
-            let worst = each.iter().reduce(|worst, scalar| {
-                match largest(scalar) > largest(worst) {
-                    true => scalar,
-                    false => worst,
-                }
-            });
+            let worst =
+                each.iter()
+                    .reduce(|worst, scalar| match largest(scalar) > largest(worst) {
+                        true => scalar,
+                        false => worst,
+                    });
             let of_kind = worst.cloned().map(|mut worst| {
                 worst.difference.spread = tallies.all.times(factor);
                 worst
