@@ -445,12 +445,12 @@ fn results_without_inputs_are_told_and_pruned() {
     let again = succeed(folder, &batch);
     let expected = "2 results have no input any more (--prune removes what has none)";
     assert!(again.words.contains(expected), "{}", again.words);
-    let check = succeed(folder, &["check", "out"]);
-    assert!(
-        check.words.contains("2 results have no input"),
-        "{}",
-        check.words
-    );
+    let check = run(folder, &["check", "out"]);
+    assert_eq!(check.code, 8, "{}", check.words);
+    let removed = "2 results have no input any more (the first: deep/b.npy); `tumble eval … --resume --prune` removes \
+                   those whose inputs or clips are gone";
+    assert!(check.words.contains(removed), "{}", check.words);
+    succeed(folder, &["check", "out", "--results-only"]);
     // A file that no longer matches its line of the manifest stays.
     fs::write(folder.join("out/deep/c.npy"), "mine").unwrap();
     let pruned = succeed(folder, &[&batch[..], &["--prune"]].concat());
@@ -524,6 +524,41 @@ fn results_of_inputs_that_may_be_elsewhere_are_not_pruned() {
     let pruned = from("two", &[share.to_str().unwrap()], &["--resume", "--prune"]);
     assert!(pruned.words.contains("s.npy: removed"), "{}", pruned.words);
     assert!(!folder.join("out/s.npy").exists());
+}
+
+/// A result whose input is somewhere else may be stale: that is no complete check.
+#[test]
+fn inputs_that_are_not_found_are_no_success() {
+    let temporary = sample_folder();
+    let folder = temporary.path();
+    fs::create_dir_all(folder.join("work/in")).unwrap();
+    for name in ["a.dat", "b.dat"] {
+        fs::copy(folder.join(name), folder.join("work/in").join(name)).unwrap();
+    }
+    let work = folder.join("work");
+    succeed(&work, &["eval", "in", "-o", "out", "--device", "cpu"]);
+    succeed(&work, &["check", "out"]);
+    // From another directory the paths in the manifest are those of no file.
+    let check = run(folder, &["check", "work/out", "--json"]);
+    assert_eq!(check.code, 8, "{}", check.words);
+    let expected = "2 input files not found (the first: in/a.dat), so changes in them are not known; run it in the directory \
+                    in which the batch ran, or add --results-only to check the results alone";
+    assert!(check.words.contains(expected), "{}", check.words);
+    let report: serde_json::Value = serde_json::from_slice(&check.out).unwrap();
+    assert_eq!(report["complete"], false, "{report}");
+    assert_eq!(
+        report["not_found"],
+        serde_json::json!(["in/a.dat", "in/b.dat"])
+    );
+    let alone = succeed(folder, &["check", "work/out", "--results-only"]);
+    assert_eq!(
+        String::from_utf8(alone.out).unwrap(),
+        "2 results, unchanged since they were written\n"
+    );
+    // A result that has changed is found with this option too.
+    fs::write(folder.join("work/out/a.npy"), "other").unwrap();
+    let check = run(folder, &["check", "work/out", "--results-only"]);
+    assert_eq!(check.code, 8, "{}", check.words);
 }
 
 /// Pruning removes what has no input, and nothing else: an input that has failed is still without its result.

@@ -969,6 +969,109 @@ fn an_offset_joins_two_clocks() {
     assert_eq!(found["clips"][0]["span"], Value::from(span.to_vec()));
 }
 
+/// Two clocks are not the age of the universe apart, and times are printed with few digits.
+#[test]
+fn offsets_of_clocks_are_possible_ones() {
+    let temporary = sample_folder();
+    let folder = temporary.path();
+    let line = ["compare", "a.dat", "b.dat", "--time-offset"];
+    let refused = run(folder, &[&line[..], &["1e300"]].concat());
+    assert_eq!(refused.code, 2, "{}", refused.words);
+    let expected = "two clocks are not 1e300 s apart: expected seconds from -1e11 to 1e11";
+    assert!(refused.words.contains(expected), "{}", refused.words);
+    let third = succeed(folder, &[&line[..], &["0.333333333333"]].concat());
+    let expected =
+        "a.dat from 0 to 2 s, b.dat from 0.333333 to 2.333333 s; compared from 0.333333 to 2 s";
+    assert!(third.words.contains(expected), "{}", third.words);
+}
+
+/// Motions without tracks, such as the joints of a robot, are compared by the names of their scalars.
+#[test]
+fn scalars_alone_are_compared() {
+    let temporary = tempfile::tempdir().unwrap();
+    let folder = temporary.path();
+    let write = |name: &str, header: &str, last: &str| {
+        std::fs::create_dir_all(folder.join(name).parent().unwrap()).unwrap();
+        let text = format!("time,{header}\n0,0,0\n1,{last}\n");
+        std::fs::write(folder.join(name), text).unwrap();
+    };
+    write("one/s.csv", "knee.scalar_angle,weight.scalar_plain", "1,1");
+    write(
+        "two/s.csv",
+        "weight.scalar_plain,knee.scalar_angle",
+        "1,0.5",
+    );
+    let (code, found) = json(folder, &["compare", "one/s.csv", "two/s.csv", "--json"]);
+    let clip = &found["clips"][0];
+    assert_eq!((code, &clip["rotation"]), (0, &Value::Null), "{found}");
+    assert_eq!(
+        (&clip["tracks"], &clip["scalar_count"]),
+        (&0.into(), &2.into())
+    );
+    assert_eq!(clip["scalars"][0]["track"], "knee");
+    let angle = clip["scalars"][0]["largest"].as_f64().unwrap();
+    assert!((angle - 0.5f64.to_degrees()).abs() < 1e-4, "{found}");
+    assert_eq!(clip["scalars"][1]["largest"], 0.0, "{found}");
+    let report = succeed(folder, &["compare", "one/s.csv", "two/s.csv"]);
+    let report = String::from_utf8(report.out).unwrap();
+    let expected =
+        "one/s.csv and two/s.csv: 2 scalars × 3 samples from 0 to 1 s\n  scalar angle mean";
+    assert!(report.starts_with(expected), "{report}");
+    assert!(!report.contains("rotation"), "{report}");
+    let over = ["--tolerance", "1deg"];
+    let failed = run(
+        folder,
+        &[&["compare", "one/s.csv", "two/s.csv"], &over[..]].concat(),
+    );
+    assert_eq!(failed.code, 8, "{}", failed.words);
+    assert!(
+        failed.words.contains("angle knee of 28.65°"),
+        "{}",
+        failed.words
+    );
+    let folders = succeed(folder, &["compare", "one", "two"]);
+    let report = String::from_utf8(folders.out).unwrap();
+    assert!(report.contains("s.csv: angle 28.65°\n"), "{report}");
+    write("three.csv", "hip.scalar_angle,elbow.scalar_angle", "1,1");
+    let refused = run(folder, &["compare", "one/s.csv", "three.csv"]);
+    assert_eq!(refused.code, 4, "{}", refused.words);
+    let expected = "have 2 and 2 scalars, none of the same name";
+    assert!(refused.words.contains(expected), "{}", refused.words);
+}
+
+/// The joint in the line of the largest angle is the first of the table, also where two joints differ equally.
+#[test]
+fn the_largest_is_the_first_of_the_table() {
+    let temporary = tempfile::tempdir().unwrap();
+    let folder = temporary.path();
+    let body = |x: [f64; 2], turned: &str| {
+        let joint = |name: &str| {
+            format!(
+                " JOINT {name}\n {{\n  OFFSET 0 0 0\n  CHANNELS 4 Xposition Xrotation Yrotation Zrotation\n  End \
+                 Site\n  {{\n   OFFSET 0 1 0\n  }}\n }}\n"
+            )
+        };
+        format!(
+            "HIERARCHY\nROOT Hips\n{{\n OFFSET 0 0 0\n CHANNELS 3 Xrotation Yrotation Zrotation\n{}{}}}\nMOTION\n\
+             Frames: 2\nFrame Time: 0.5\n0 0 0 0 0 0 0 0 0 0 0\n0 0 0 {} {turned} {} {turned}\n",
+            joint("Left"),
+            joint("Right"),
+            x[0],
+            x[1]
+        )
+    };
+    std::fs::write(folder.join("a.bvh"), body([0.0, 0.0], "0 0 0")).unwrap();
+    std::fs::write(folder.join("b.bvh"), body([0.0, 1.0], "2 0 0")).unwrap();
+    let (_, found) = json(
+        folder,
+        &["compare", "a.bvh", "b.bvh", "--json", "--top", "1"],
+    );
+    let clip = &found["clips"][0];
+    assert_eq!(clip["joints"][0]["track"], "Right", "{found}");
+    assert_eq!(clip["rotation"]["track"], "Right", "{found}");
+    assert_eq!(clip["translation"]["track"], "Right", "{found}");
+}
+
 /// Two directories: the files of one name are compared.
 #[test]
 fn directories_are_compared_file_by_file() {
@@ -1018,6 +1121,27 @@ fn directories_are_compared_file_by_file() {
     );
     let report = String::from_utf8(succeed(folder, &["compare", "short", "whole"]).out).unwrap();
     assert!(report.contains("same.dat: 2 s in only one\n"), "{report}");
+    // A number that is none in one of them has no difference.
+    for (side, number) in [("nan", f32::NAN), ("number", 1.5)] {
+        let header = "{'descr': '<f4', 'fortran_order': False, 'shape': (2,), }";
+        let mut bytes = b"\x93NUMPY\x01\x00\x76\x00".to_vec();
+        bytes.extend(format!("{header:<117}\n").bytes());
+        bytes.extend([number, 2.0].iter().flat_map(|number| number.to_le_bytes()));
+        std::fs::create_dir(folder.join(side)).unwrap();
+        std::fs::write(folder.join(side).join("n.npy"), bytes).unwrap();
+    }
+    let (code, found) = json(
+        folder,
+        &["compare", "nan", "number", "--json", "--tolerance", "1"],
+    );
+    let pair = &found["pairs"][0];
+    assert_eq!(
+        (code, &pair["number"], &pair["not_finite"]),
+        (8, &0.0.into(), &1.into())
+    );
+    let report = String::from_utf8(succeed(folder, &["compare", "nan", "number"]).out).unwrap();
+    let expected = "n.npy: 1 number is NaN or infinite in only one\n";
+    assert!(report.contains(expected), "{report}");
     write("after/deep/turn.dat", "# 1 1\n0 1 0\n");
     let failed = run(folder, &line);
     assert_eq!(failed.code, 3, "{}", failed.words);

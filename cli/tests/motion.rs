@@ -448,7 +448,13 @@ fn a_check_finds_changed_files_of_options() {
         line(folder, &batch);
         line(folder, &format!("check {option}"));
         fs::remove_file(folder.join(file)).unwrap();
-        line(folder, &format!("check {option}"));
+        let absent = run(folder, &["check", option]);
+        let words = format!("1 input file not found (the first: {file})");
+        assert!(
+            absent.code == 8 && absent.words.contains(&words),
+            "{}",
+            absent.words
+        );
     }
 }
 
@@ -755,4 +761,43 @@ fn info_lists_the_values_of_a_pickle() {
         assert!(both.contains(part), "{part}: {both}");
     }
     assert!(refused(at, "info calls.pkl").words.contains("E911"));
+}
+
+/// The mirror image of a walk is another walk, and the image of this is the first again.
+#[test]
+fn a_walk_is_mirrored() {
+    let temporary = sample_folder();
+    let folder = temporary.path();
+    let walk = concat!(env!("CARGO_MANIFEST_DIR"), "/../data/walk.bvh");
+    fs::copy(walk, folder.join("w.bvh")).unwrap();
+    let made = line(folder, "convert w.bvh --mirror x -o m.bvh");
+    let expected = "pairs of joints change their sides";
+    assert!(made.words.contains(expected), "{}", made.words);
+    assert!(!made.words.contains("W908"), "{}", made.words);
+    line(folder, "convert m.bvh --mirror x -o back.bvh");
+    line(
+        folder,
+        "compare w.bvh back.bvh --tolerance 1e-3deg --distance 1e-4",
+    );
+    let other = run(
+        folder,
+        &["compare", "w.bvh", "m.bvh", "--tolerance", "1deg"],
+    );
+    assert_eq!(other.code, 8, "{}", other.words);
+    // From head to feet a body is no mirror image.
+    let made = line(folder, "convert w.bvh --mirror y -o y.glb");
+    assert!(made.words.contains("W908"), "{}", made.words);
+    fs::write(
+        folder.join("s.csv"),
+        "time,left_knee.scalar_angle,right_knee.scalar_angle\n0,0,0\n1,1,0\n",
+    )
+    .unwrap();
+    let refused = run(
+        folder,
+        &["convert", "s.csv", "--mirror", "y", "-o", "t.csv"],
+    );
+    assert_eq!(refused.code, 4, "{}", refused.words);
+    let expected =
+        "error[E916]: the axis of the joint `left_knee` is not known; give the robot (--robot)";
+    assert!(refused.words.contains(expected), "{}", refused.words);
 }

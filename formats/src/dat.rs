@@ -15,7 +15,7 @@ use std::path::Path;
 
 use glam::{DQuat, Quat};
 
-use crate::diagnostic::{Code, Diagnostic, counted};
+use crate::diagnostic::{Code, Diagnostic};
 use crate::feature::Feature;
 use crate::format::{Format, FormatOption, Loaded, ReadOptions};
 use crate::motion::Motion;
@@ -25,6 +25,7 @@ use crate::source::Source;
 use crate::text::blocks::Blocks;
 use crate::text::lines::{Lines, tokens};
 use crate::text::number;
+use tumble::names::counted;
 use tumble::{NORM_TOLERANCE, TrackSet};
 
 /// The largest number of boxes of a file.
@@ -257,7 +258,7 @@ impl DatKeys {
         if found == expected {
             return Ok(());
         }
-        let numbers = counted(found, "number", "numbers");
+        let numbers = counted(found, "number");
         let message = format!("{numbers} where {expected} are expected: a time and 4 for each box");
         let column = extra.unwrap_or(line.trim_end().len() as u64 + 1);
         Err(lines.refuse(column, Code::Columns, message))

@@ -5,12 +5,6 @@ use std::fmt;
 
 use crate::printable::printable;
 
-/// `1 number`, `4 numbers`; `plural` is the word for all numbers but 1.
-pub(crate) fn counted(number: usize, singular: &str, plural: &str) -> String {
-    let noun = if number == 1 { singular } else { plural };
-    format!("{number} {noun}")
-}
-
 /// Whether an input is refused, or read with a warning.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Severity {
@@ -257,7 +251,7 @@ codes! {
     TableDamaged = "E401", "a table that cannot be read", "The file is truncated or damaged, or uses a feature that is not supported; the message gives the reason. Rows are counted from 0.";
     TableClaims = "E402", "more than the file can contain", "The file states more rows or bytes than its length can contain; nothing was read.";
     Compression = "E403", "a compression that is not read", "Parquet is read uncompressed and with snappy, zstd and LZ4, Arrow uncompressed and with zstd and LZ4.";
-    NoRotations = "E404", "no rotations among the columns", "Rotations are the columns `x y z w` (a row for each key), `knee.x knee.y knee.z knee.w` (a row for each time), or a part of a list that --map names.";
+    NoRotations = "E404", "no rotations among the columns", "Rotations are the columns `x y z w` (a row for each key), `knee.x knee.y knee.z knee.w` (a row for each time), or a part of a list that --map names. A table of numbers without rotations, such as the angles of joints, is read by `--map knee=COLUMN:scalar:angle` (radians; `:deg` for degrees), or `:scalar` for other numbers.";
     NoTimes = "E405", "no times among the columns", "Times are a column `time`, `timestamp` or `t`, or `frame_index` with --source-fps; --map time=NAME names another. In CSV, commas must separate the columns, and the first line must name them; a file with semicolons or tabs, or without names, has no such column.";
     ColumnMissing = "E406", "a column is missing", "A column that `--map` names does not exist, or a group of columns such as `tx ty tz` is not complete.";
     ColumnTwice = "E407", "two columns of one name", "It is not clear which of them is meant; rename one.";
@@ -310,6 +304,7 @@ codes! {
     PickleType = "E913", "an array of a type that is not read", "Arrays of numbers (floats, integers, truth values) and of texts are read. Records, dates and complex numbers are not; save each part as an array.";
     PickleForm = "E914", "a form of pickle that is not read", "Its compression, its protocol or the location of its data is not supported. The message says how to save the file again.";
     PickleLimits = "E915", "a pickle beyond the limits", "Its values are nested more than 1000 deep, there are more than 2^24 of them, or a value contains itself. Or the values would need more memory than is allowed; a value counts once for each reference to it.";
+    Mirror = "E916" elsewhere, "a clip that cannot be mirrored", "Joints are exchanged with those of the same name on the other side, and their parents must be such pairs too. The sign of an angle depends on the axis of the joint, so `--robot` is needed for the joints of a robot; the axes of both sides must be mirror images at the plane of `--mirror`.";
     NotRecognised = "E917" elsewhere, "a skeleton that is not recognised", "Joints of two skeletons are paired by the parts of the body. The parts are found by the names and parents of joints, as in known kinds of skeletons; this skeleton is of another kind. Pair its joints with `--bones`.";
     Dialect = "E918" elsewhere, "a motion that a dialect cannot store", "The layout of the other program has a number for each hinge and slide, one root, and frames of one rate. The message names the part of the motion that it cannot store. `--fps` of `tumble eval` samples a motion at another rate; NPZ, CSV and GLB (without `--dialect`) store all of it.";
     OutsideLimits = "E919" elsewhere, "a joint outside its limits", "`--limits refuse` makes this an error. `--limits clamp` keeps joints inside, `--limits report` warns and keeps their values.";
@@ -380,6 +375,7 @@ codes! {
     RobotMerged = "W905" elsewhere, "bodies that MuJoCo merges", "If `fusestatic` is set, MuJoCo merges bodies without joints into their parents. Then the numbers of bodies differ; the names are the same.";
     UnnamedJoints = "W906", "joints without names", "The file has a number for each joint and does not name them. They are numbered in the order of the file, which depends on the program that wrote it. `--robot FILE`, in Python `robot=`, gives them the names of the joints in a robot's file. The numbers of a list in a table, such as `action` of LeRobot, get names by `--map`, as in `left_knee=action[3]:scalar:angle`.";
     QuaternionOrder = "W907", "a quaternion whose order is doubtful", "The first component is large and the last small, as for a robot that stands upright if w is first. The columns have no names; state the order with `--source-order`.";
+    NotSymmetric = "W908" elsewhere, "a rest pose that is not its mirror image", "Mirroring exchanges the motion of both sides, and the skeleton stays as it is. Positions are those of the mirror image only as far as the rest pose is its own mirror image. If it is far from it, the axis of `--mirror` is probably not the one from left to right.";
     TranslationsDropped = "W910" elsewhere, "translations of joints that are lost", "On the target skeleton, only the hips have translations. Other joints of the source also move relative to their parents; the message has the largest distance.";
     InertObjects = "W911", "objects of classes that are not read", "Only the names of their classes are kept; no code is run. If the motion needs the value of such an object, this is an error (E912).";
     TrailingBytes = "W912", "bytes after the end of a pickle", "They are not read. Several pickles in one file, one after another, may be meant; save them as one list.";

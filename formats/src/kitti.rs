@@ -8,9 +8,10 @@ use std::path::Path;
 
 use glam::{DMat3, DQuat, DVec3};
 use tumble::FrameRate;
+use tumble::names::counted;
 
 use crate::decimal::{Decimal, decimal_count};
-use crate::diagnostic::{Code, Diagnostic, counted};
+use crate::diagnostic::{Code, Diagnostic};
 use crate::feature::Feature;
 use crate::format::{
     Format, FormatOption, Loaded, MotionOptions, ReadOptions, TimeUnit, WriteError,
@@ -155,8 +156,9 @@ pub fn read_kitti(
         (Some(found), _) => {
             if found.times.len() != count {
                 let message = format!(
-                    "{count} poses, and {} times for them; is it another sequence's file of times?",
-                    found.times.len()
+                    "{}, and {} for them; is it another sequence's file of times?",
+                    counted(count, "pose"),
+                    counted(found.times.len(), "time")
                 );
                 return Err(Diagnostic::new(name, Code::FrameTimes, message));
             }
@@ -196,7 +198,7 @@ fn read_rows<R: BufRead>(
             NUMBERS => "",
             _ => ", and those after the first pose",
         };
-        let numbers = counted(found, "number", "numbers");
+        let numbers = counted(found, "number");
         let message =
             format!("{numbers} where {expected} are expected: three rows of a matrix{after}");
         return Err(lines.refuse(column, Code::KittiPose, message));
@@ -224,7 +226,7 @@ fn read_rows<R: BufRead>(
         .any(|warning| warning.code == Code::FurtherNumbers);
     if !is_known && !after.is_empty() && after != FOURTH_ROW {
         let column = tokens(line).nth(NUMBERS).map_or(1, |(at, _)| at);
-        let further = counted(after.len(), "number", "numbers");
+        let further = counted(after.len(), "number");
         let message = format!("left out: {further} after each pose");
         lines.warn(column, Code::FurtherNumbers, message);
     }

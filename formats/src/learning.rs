@@ -1,11 +1,13 @@
 //! Features of motions that people train on, in f64 and with the same bits on every processor: rotations as six numbers,
-//! headings, root motion, contacts, mirrored poses, and the 263 numbers of HumanML3D.
+//! headings, root motion, contacts, mirrored poses, the 263 numbers of HumanML3D, and Kimodo's.
 //! [docs/features.md](https://github.com/tumble-rs/tumble/blob/main/docs/features.md) has the formulas and their sources.
 
 mod contacts;
 pub(crate) mod heading;
 mod humanml3d;
+mod kimodo;
 mod mirror;
+mod mirrored;
 pub(crate) mod root_motion;
 mod sets;
 mod six;
@@ -15,7 +17,9 @@ pub use heading::{Ground, facing, forward_heading, twist_heading};
 pub use humanml3d::{
     HUMANML3D_JOINTS, HUMANML3D_NUMBERS, Humanml3dError, humanml3d, positions_of_humanml3d,
 };
+pub use kimodo::{KIMODO_NUMBERS, KimodoError, kimodo};
 pub use mirror::{mirror_pairs, mirrored_point, mirrored_rotation};
+pub use mirrored::{Mirror, MirrorError, MirrorReport, mirrored};
 pub use root_motion::{HeadingSource, RootMotion};
 pub use sets::{
     FeatureArray, FeatureError, FeatureRequest, FeatureSet, WorldFrames, feature_arrays,

@@ -225,7 +225,8 @@ pub(crate) fn noticed_change(period: f64, rate: FrameRate) -> Option<f64> {
 /// The warning that a file's rate is replaced.
 pub(crate) fn overridden(rate: FrameRate, other: FrameRate) -> String {
     format!(
-        "the file states {rate} frames a second; because of --override-fps it is read at {other}"
+        "the file states {}; because of --override-fps it is read at {other}",
+        rate.in_words()
     )
 }
 

@@ -21,10 +21,15 @@ pub struct FrameTimes {
     pub(crate) warnings: Vec<Diagnostic>,
 }
 
-/// A time in seconds on the clock of a clip's file, for messages: to a microsecond. `time_offset` is the clip's whole
-/// second from which `time` counts.
+/// A time in seconds on the clock of a clip's file, for messages: to a microsecond, and very large ones with an
+/// exponent. `time_offset` is the clip's whole second from which `time` counts.
 #[must_use]
 pub fn clock_text(time_offset: i64, time: f64) -> String {
+    /// From here on, the step of an f64 is longer than a microsecond by far.
+    const EXPONENT: f64 = 1e15;
+    if time.abs() >= EXPONENT {
+        return format!("{time:e}");
+    }
     time_text(time_offset, (time * 1e6).round() / 1e6)
 }
 

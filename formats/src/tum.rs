@@ -6,10 +6,11 @@ use std::io::{BufRead, Write};
 use std::path::Path;
 
 use glam::{DQuat, DVec3, Quat};
+use tumble::names::counted;
 use tumble::{TrackError, TrackSet};
 
 use crate::decimal::{Decimal, decimal_count, offset_of};
-use crate::diagnostic::{Code, Diagnostic, Location, counted};
+use crate::diagnostic::{Code, Diagnostic, Location};
 use crate::feature::Feature;
 use crate::format::{
     Format, FormatOption, Loaded, MotionOptions, ReadOptions, TimeUnit, WriteError,
@@ -167,7 +168,7 @@ impl TrajectoryPoses {
     ) -> Result<(), Diagnostic> {
         let found = tokens(line).count();
         if self.columns == 0 && found > 8 && !has_decimal_commas(original) {
-            let further = counted(found - 8, "number", "numbers");
+            let further = counted(found - 8, "number");
             let message = format!("left out: {further} after each pose");
             lines.warn(
                 tokens(line).nth(8).map_or(1, |(at, _)| at),
@@ -188,7 +189,7 @@ impl TrajectoryPoses {
             };
             let message = format!(
                 "{} where {columns} are expected: {}{more}",
-                counted(found, "number", "numbers"),
+                counted(found, "number"),
                 format.numbers
             );
             return Err(lines.refuse(column, Code::TumPose, message));
@@ -256,10 +257,9 @@ impl TrajectoryPoses {
                 line: self.lines[first],
                 column: 1,
             };
-            let message = format!(
-                "{} poses have numbers that are missing; the path is interpolated from the others",
-                gaps.len()
-            );
+            let poses = counted(gaps.len(), "pose");
+            let message =
+                format!("{poses} with missing numbers; the path is interpolated from the others");
             (Some(location), message)
         });
         lines.warnings.append(&mut warnings.into_list());

@@ -29,6 +29,7 @@ mod left_out;
 mod maps;
 #[cfg(feature = "mcap")]
 mod mcap;
+mod mirrored;
 mod morphs;
 mod npz;
 mod origins;

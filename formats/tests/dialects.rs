@@ -7,6 +7,7 @@ use tumble::glam::{Quat, Vec3};
 use tumble_formats::motion::{Motion, ScalarKind};
 use tumble_formats::npy::read_numbers;
 use tumble_formats::pickle::Contents;
+use tumble_formats::robot::Robot;
 use tumble_formats::{Code, Format, Loaded, ReadOptions};
 
 use crate::support::shared_data;
@@ -392,6 +393,17 @@ fn files_of_joints_hold_the_stored_numbers() {
             "{scalar}"
         );
     }
+    // With the robot, names of motors are those of its joints, and what was commanded is left out.
+    let robot = shared_data().unwrap().join("robots/robots/pico.xml");
+    let robot = Robot::open(&robot).unwrap();
+    let mut episode = open("xr_teleoperate.json");
+    robot
+        .assign(&mut episode, "xr_teleoperate.json", None)
+        .unwrap();
+    let clip = &episode.clips[0];
+    let elbow = clip.set.scalar_named("left_elbow").unwrap();
+    assert_eq!(clip.set.scalar(elbow).unwrap().keys, column(4));
+    assert_eq!(clip.set.scalar_count(), 4);
     for (folder, tables) in [
         (
             "lerobot_v21",

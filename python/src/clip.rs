@@ -124,11 +124,3 @@ impl Clip {
             })
     }
 }
-
-/// `1 track`, `4 tracks`.
-pub(crate) fn counted(number: usize, noun: &str) -> String {
-    match number {
-        1 => format!("1 {noun}"),
-        _ => format!("{number} {noun}s"),
-    }
-}

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use pyo3::prelude::*;
+use tumble::names::counted;
 use tumble_formats::compare::{self as differences, ClipPair, CompareError, PathMeasure};
 use tumble_formats::motion::Motion;
 use tumble_formats::npz;
@@ -62,6 +63,8 @@ pub(crate) struct ArrayDifference {
     numbers: usize,
     /// The number of numbers that differ.
     differing: usize,
+    /// The number of numbers that are NaN or infinite in only one of the arrays; not in `difference`.
+    not_finite: usize,
     /// The differences of numbers.
     difference: Spread,
     /// The indices of the largest difference.
@@ -75,6 +78,7 @@ pub(crate) struct ArrayDifference {
 value!(ArrayDifference {
     numbers,
     differing,
+    not_finite,
     difference,
     largest_at,
     rotation,
@@ -237,14 +241,18 @@ pub(crate) struct ClipDifference {
     span: (f64, f64),
     /// The number of rotations whose bits are the same.
     identical: u64,
-    /// The differences of rotations in degrees.
-    rotation: ChannelDifference,
+    /// The differences of rotations in degrees; None if the clips have only scalars in common.
+    rotation: Option<ChannelDifference>,
     /// The differences of translations, as lengths; None if neither clip has translations.
     translation: Option<ChannelDifference>,
     /// The differences of scales, as lengths; None if neither clip has scales.
     scale: Option<ChannelDifference>,
     /// The differences of each track, in the order of the first clip.
     joints: Vec<JointDifference>,
+    /// The differences of each scalar that both clips have: angles in degrees, others as they are.
+    scalars: Vec<ChannelDifference>,
+    /// The names of the scalars that only one clip has: a list for the first clip, and one for the second.
+    missing_scalars: (Vec<String>, Vec<String>),
 }
 
 value!(ClipDifference {
@@ -257,6 +265,8 @@ value!(ClipDifference {
     translation,
     scale,
     joints,
+    scalars,
+    missing_scalars,
 });
 
 #[pymethods]
@@ -267,10 +277,16 @@ impl ClipDifference {
     }
 
     fn __repr__(&self) -> String {
-        format!(
-            "ClipDifference({} tracks, {} samples, largest angle {:.3e}°)",
-            self.tracks, self.samples, self.rotation.largest
-        )
+        let mut compared = Vec::new();
+        if let Some(rotation) = &self.rotation {
+            compared.push(counted(self.tracks, "track"));
+            compared.push(format!("largest angle {:.3e}°", rotation.largest));
+        }
+        if !self.scalars.is_empty() {
+            compared.push(counted(self.scalars.len(), "scalar"));
+        }
+        let samples = counted(self.samples, "sample");
+        format!("ClipDifference({}, {samples})", compared.join(", "))
     }
 }
 
@@ -403,9 +419,9 @@ fn of_compare(error: CompareError) -> PyErr {
 ///
 /// Clips are interpolated as their files state, at every key of both and halfway between neighbouring keys, or at `fps`
 /// (from `start` to `end`), or at the times `at`. Tracks are matched by equal names, or by index if neither clip has
-/// names. `world` compares joints in the world instead of relative to their parents. Returns a `ClipDifference`, whose
-/// `rotation` is in degrees. Arrays of the same shape are compared number by number, and by angles if they contain
-/// rotations. Returns an `ArrayDifference`.
+/// names, and scalars by equal names. `world` compares joints in the world instead of relative to their parents.
+/// Returns a `ClipDifference`, whose `rotation` is in degrees. Arrays of the same shape are compared number by number,
+/// and by angles if they contain rotations. Returns an `ArrayDifference`.
 ///
 /// >>> import tumble
 /// >>> one = tumble.Clip([0.0, 2.0], [[0, 0, 0, 1], [0, 0, 1, 0]])
@@ -474,6 +490,7 @@ fn of_arrays(py: Python<'_>, arrays: [&Bound<'_, PyAny>; 2]) -> PyResult<ArrayDi
     Ok(ArrayDifference {
         numbers: found.numbers,
         differing: found.differing,
+        not_finite: found.not_finite,
         difference: found.difference.into(),
         largest_at: found.largest_at,
         rotation: found.rotation.map(Spread::from),
@@ -515,6 +532,8 @@ fn of_clips(
     let found = pair.differences(engine, &frames, world);
     let found = found.map_err(of_compare)?;
     let [first, second] = found.missing;
+    let [first_scalars, second_scalars] = found.missing_scalars;
+    let scalars = found.each_scalar.into_iter();
     let [start, end] = found.span;
     let difference = ClipDifference {
         tracks: found.tracks,
@@ -522,7 +541,7 @@ fn of_clips(
         samples: found.samples,
         span: (start, end),
         identical: found.identical,
-        rotation: found.rotation.into(),
+        rotation: found.rotation.map(ChannelDifference::from),
         translation: found.translation.map(ChannelDifference::from),
         scale: found.scale.map(ChannelDifference::from),
         joints: found
@@ -530,6 +549,10 @@ fn of_clips(
             .into_iter()
             .map(JointDifference::from)
             .collect(),
+        scalars: scalars
+            .map(|scalar| ChannelDifference::from(scalar.difference))
+            .collect(),
+        missing_scalars: (first_scalars, second_scalars),
     };
     Ok((difference, warnings))
 }

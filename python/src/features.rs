@@ -240,7 +240,7 @@ pub(crate) fn root_after_loops<'py>(
 }
 
 /// The index of an axis: 0, 1 or 2 for "x", "y" or "z".
-fn axis_of(axis: &Bound<'_, PyAny>) -> PyResult<usize> {
+pub(crate) fn axis_of(axis: &Bound<'_, PyAny>) -> PyResult<usize> {
     one_of(axis, "axis", &[("x", 0), ("y", 1), ("z", 2)])
 }
 

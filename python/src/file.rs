@@ -9,6 +9,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use pyo3::exceptions::{PyException, PyIndexError, PyKeyError, PyTypeError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString, PyTuple};
+use tumble::names::counted;
 use tumble_formats::adjust::{JointOffsets, OffsetsError, UpAxis, adjust_all, set_all_offsets};
 use tumble_formats::format::FormatOption;
 use tumble_formats::keys::Duplicates;
@@ -18,7 +19,7 @@ use tumble_formats::npz::body_offsets;
 use tumble_formats::{Diagnostic, Format, Limits, Loaded, ReadOptions};
 
 use crate::arrays::{ListArgument, doubles};
-use crate::clip::{Clip, Source, counted};
+use crate::clip::{Clip, Source};
 use crate::clip_shape::ClipShape;
 use crate::errors::{expected, guarded, input, of_diagnostic, of_track, warn};
 use crate::names::{one_of, option_of, unknown_name};

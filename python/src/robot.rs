@@ -7,6 +7,7 @@ use numpy::{Element, PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString, PyType};
 use tumble::method::BESSEL_OVERHAUSER;
+use tumble::names::counted;
 use tumble::trees::{
     BodyMotion, BodyPose, BodyVelocity, Configuration, ConfigurationRates, JointKind, Tree,
 };
@@ -57,7 +58,7 @@ impl Robot {
     /// ...     '<body name="hand" pos="0 0 1"/></body></worldbody></mujoco>')
     /// >>> robot = tumble.Robot.load(path)
     /// >>> robot
-    /// Robot("", 2 bodies, 1 joints)
+    /// Robot("", 2 bodies, 1 joint)
     #[classmethod]
     fn load(class: &Bound<'_, PyType>, path: PathBuf) -> PyResult<Self> {
         let py = class.py();
@@ -218,16 +219,19 @@ impl Robot {
     fn __repr__(&self) -> String {
         let counts = self.tree().counts();
         format!(
-            "Robot({:?}, {} bodies, {} joints)",
+            "Robot({:?}, {}, {})",
             self.robot.name,
-            self.tree().bodies().len(),
-            counts.scalars + counts.balls + counts.free
+            match self.tree().bodies().len() {
+                1 => "1 body".to_owned(),
+                count => format!("{count} bodies"),
+            },
+            counted(counts.scalars + counts.balls + counts.free, "joint")
         )
     }
 }
 
 impl Robot {
-    fn tree(&self) -> &Tree {
+    pub(crate) fn tree(&self) -> &Tree {
         &self.robot.tree
     }
 

@@ -6,9 +6,10 @@ use numpy::PyArrayDyn;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use tumble::Quantity;
+use tumble::names::counted;
 
 use crate::arrays::{Order, number};
-use crate::clip::{Clip, counted};
+use crate::clip::Clip;
 use crate::engine::default_engine;
 use crate::errors::{guarded, input, of_engine, warn};
 use crate::evaluate::curve_warnings;

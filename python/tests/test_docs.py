@@ -177,7 +177,8 @@ try:
     found = engine.add(engine.mix(found, found, 0.5), found, reference=[0, 0, 0, 1])
     found = engine.local_to_model(found, [None, 0], np.zeros((2, 3)), scales=[None, found])
     positions, found = engine.follow(None, [[0, 0, 0], [1, 0, 0]], duration=1, fps=24, ends="natural")
-    angle: float = tumble.compare(clip, tumble.reduce(clip, curve="cubic").clip).rotation.largest
+    rotation = tumble.compare(clip, tumble.reduce(clip, curve="cubic").clip).rotation
+    angle: float = rotation.largest if rotation is not None else 0.0
     differing: int = tumble.compare(found, found).differing
     scale: float = tumble.path_errors(clip, clip, align="sim3", rpe="1s").scale
     crowd = tumble.Crowd([clip], 100, parents=[None, None])

@@ -50,6 +50,17 @@ const OTHER_NAMES: [(&str, &[&str]); 22] = [
     ("track", &["joint", "track-major", "bone"]),
 ];
 
+/// A number with its noun, for messages: `1 track`, `4 tracks`, `4 entries`.
+#[doc(hidden)]
+#[must_use]
+pub fn counted(number: usize, noun: &str) -> String {
+    match (number, noun.strip_suffix("ry")) {
+        (1, _) => format!("1 {noun}"),
+        (_, Some(stem)) => format!("{number} {stem}ries"),
+        _ => format!("{number} {noun}s"),
+    }
+}
+
 /// The known name of a value that others call `name`. Case does not matter, and spaces and `_` are `-`.
 #[doc(hidden)]
 pub fn by_meaning<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {

@@ -102,6 +102,16 @@ impl FrameRate {
         // At usual rates, this product is exact for every possible number of frames.
         frame as f64 * self.seconds as f64 / self.frames as f64
     }
+
+    /// The rate with its unit, for messages: `1 frame a second`, `30000/1001 frames a second`.
+    #[doc(hidden)]
+    #[must_use]
+    pub fn in_words(self) -> String {
+        match (self.frames, self.seconds) {
+            (1, 1) => "1 frame a second".to_owned(),
+            _ => format!("{self} frames a second"),
+        }
+    }
 }
 
 fn gcd(a: u64, b: u64) -> u64 {

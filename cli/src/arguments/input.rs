@@ -11,6 +11,7 @@ use clap::Args;
 use tumble_formats::format::{Document, FormatOption};
 use tumble_formats::motion::Motion;
 use tumble_formats::printable::printable;
+use tumble_formats::quaternion::ComponentOrder;
 use tumble_formats::{
     Code, Diagnostic, FORMATS, Feature, Format, Limits, Loaded, ReadOptions, file_kind,
 };
@@ -126,6 +127,16 @@ impl Inputs {
             pipes: self.pipes,
             repeats: Repeats::Once,
         }
+    }
+
+    /// The same inputs, read with another order of quaternions' components. The robot is read before, so that its
+    /// warnings are printed once.
+    pub(crate) fn with_source_order(&self, order: ComponentOrder) -> Result<Self, Failure> {
+        self.reading.robot()?;
+        Ok(Self {
+            reading: self.reading.with_source_order(order),
+            ..self.clone()
+        })
     }
 
     /// The format in which an input is read.

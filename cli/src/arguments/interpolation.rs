@@ -193,8 +193,9 @@ pub(crate) fn kept(
     let found = outside.kept(frames, rate, clip);
     let kept = found.map_err(|error| of_outside(error, name))?;
     if kept.left_out > 0 {
+        let lie = if kept.all == 1 { "lies" } else { "lie" };
         words::note(&format!(
-            "{name}: {} of {} lie outside the keys; they are left out",
+            "{name}: {} of {} {lie} outside the keys; they are left out",
             kept.left_out,
             words::count(kept.all, "time")
         ));

@@ -237,6 +237,7 @@ pub(crate) const OPTIONS: &[OptionRule] = &[
     deciding("velocities"),
     deciding("limits"),
     deciding("describe"),
+    deciding("mirror"),
     of_results("root_motion", root_motion),
     deciding("heading"),
     deciding("root_joint"),

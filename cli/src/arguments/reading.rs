@@ -223,6 +223,14 @@ impl ReadingArguments {
             || up_axis.is_some()
     }
 
+    /// The same options, with this order of quaternions' components.
+    pub(crate) fn with_source_order(&self, order: ComponentOrder) -> Self {
+        Self {
+            source_order: Some(order),
+            ..self.clone()
+        }
+    }
+
     /// The robot that moves. It is read once, and its warnings are printed then.
     pub(crate) fn robot(&self) -> Result<Option<Arc<Robot>>, Failure> {
         let Some(file) = &self.robot else {

@@ -16,6 +16,7 @@ use tumble_formats::robot::{
     VelocitySource, bodies, clamp_scalars, scalar_excesses,
 };
 use tumble_formats::sample::ChannelMethods;
+use tumble_formats::times::clock_text;
 use tumble_formats::{Code, Diagnostic};
 
 use crate::arguments::output::{body_order, one_of};
@@ -23,6 +24,7 @@ use crate::arguments::results::ResultArguments;
 use crate::batch::pipeline::ClipWork;
 use crate::batch::target::WrittenFile;
 use crate::messages::exit::{ALL_INPUTS, Failure};
+use crate::messages::words;
 
 /// How the motion of a robot is written.
 #[derive(Debug, Clone, Args)]
@@ -147,9 +149,13 @@ impl RobotReport {
 
     /// `13 joints depth-first, 15 bodies depth-first`.
     pub(crate) fn text(&self) -> String {
-        let joints = format!("{} joints {}", self.joints.len(), self.joint_order);
+        let joints = words::count(self.joints.len(), "joint");
+        let joints = format!("{joints} {}", self.joint_order);
         let bodies = self.bodies.as_ref().zip(self.body_order);
-        let bodies = bodies.map(|(bodies, order)| format!(", {} bodies {order}", bodies.len()));
+        let bodies = bodies.map(|(bodies, order)| match bodies.len() {
+            1 => format!(", 1 body {order}"),
+            count => format!(", {count} bodies {order}"),
+        });
         format!("{}: {joints}{}", self.dialect, bodies.unwrap_or_default())
     }
 }
@@ -249,9 +255,15 @@ impl DialectArguments {
     }
 
     /// The text of the message about joints that leave their limits; `None` if none does.
-    fn limits_text(&self, excesses: &[LimitExcess], times: &[f64]) -> Option<String> {
+    fn limits_text(
+        &self,
+        excesses: &[LimitExcess],
+        clip: &Motion,
+        times: &[f64],
+    ) -> Option<String> {
         let joint = |excess: &LimitExcess| {
             let time = times.get(excess.sample).copied().unwrap_or(0.0);
+            let time = clock_text(clip.time_offset, time);
             format!(
                 "`{}` by up to {:.4} {} (first at {time} s)",
                 excess.joint, excess.excess, excess.unit
@@ -287,7 +299,7 @@ impl DialectArguments {
         rates: Option<&mut [f32]>,
     ) -> Result<(), Failure> {
         let excesses = scalar_excesses(clip, values);
-        let Some(message) = self.limits_text(&excesses, times) else {
+        let Some(message) = self.limits_text(&excesses, clip, times) else {
             return Ok(());
         };
         match self.limits {
@@ -322,7 +334,7 @@ impl DialectArguments {
                 "",
             ));
         };
-        if let Some(message) = self.limits_text(&bodies.excesses, &bodies.times) {
+        if let Some(message) = self.limits_text(&bodies.excesses, clip, &bodies.times) {
             work.warn(Diagnostic::new(name, Code::JointLimits, message));
         }
         let order = self.body_order.unwrap_or(dialect.order);

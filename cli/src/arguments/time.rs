@@ -445,8 +445,9 @@ impl SampleChoice {
             return Ok(all);
         };
         let in_gaps = held.iter().flatten().count();
+        let lie = if times.len() == 1 { "lies" } else { "lie" };
         let found = format!(
-            "{name}: {in_gaps} of {} lie between keys that are more than {max_gap} s apart",
+            "{name}: {in_gaps} of {} {lie} between keys that are more than {max_gap} s apart",
             words::count(times.len(), "time")
         );
         let each = times.iter().zip(&held);
@@ -565,7 +566,7 @@ fn warn_outside_keys(start: f64, end: f64, clip: &Motion, outside: Outside, name
     let [is_default_before, is_default_after] = outside.is_default();
     if start < first && is_default_before || end > last && is_default_after {
         let [start, end, first, last] =
-            [start, end, first, last].map(|time| time + clip.time_offset as f64);
+            [start, end, first, last].map(|time| clock_text(clip.time_offset, time));
         words::warning(&format!(
             "{name}: the times from {start} to {end} s exceed the keys, {first} to {last} s; outside them the first or \
              the last key is held (--before and --after select other values)"
@@ -588,7 +589,9 @@ pub(crate) fn check_range(start: Option<f64>, end: Option<f64>) -> Result<(), Fa
         && end < start
     {
         return Err(Failure::usage(format!(
-            "the range ends at {end} s, before it starts at {start} s; swap --start and --end"
+            "the range ends at {} s, before it starts at {} s; swap --start and --end",
+            clock_text(0, end),
+            clock_text(0, start)
         )));
     }
     Ok(())
@@ -600,6 +603,19 @@ pub(crate) fn finite_seconds(text: &str) -> Result<f64, String> {
         Ok(time) if time.is_finite() => Ok(time),
         _ => Err(format!(
             "invalid time `{text}`: expected a finite number of seconds"
+        )),
+    }
+}
+
+/// Parses the difference of two clocks.
+pub(crate) fn clock_difference(text: &str) -> Result<f64, String> {
+    /// Two clocks that count seconds, one from 1970 and one from the start of a recording, are not further apart: it
+    /// is the year 5138.
+    const LARGEST: f64 = 1e11;
+    match finite_seconds(text)? {
+        difference if difference.abs() <= LARGEST => Ok(difference),
+        _ => Err(format!(
+            "two clocks are not {text} s apart: expected seconds from -1e11 to 1e11"
         )),
     }
 }

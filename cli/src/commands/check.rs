@@ -30,16 +30,22 @@ JSON with the SHA-256 of the result, of its input (with the files that it refers
 the files that options name, the options, the kernels, the program's version and the device; \
 and a line for each input that failed or has no result yet. The exit code is 0 only if the \
 batch is complete: all inputs have their results, and no result, no input and no file that an option \
-names has changed. Inputs that are not found by their paths in the manifest are not checked. If shards \
+names has changed. Inputs are looked for by their paths in the manifest, so run it in the directory in which \
+the batch ran; the exit code is 8 if one is not found. Where the inputs are on another machine, \
+--results-only checks the results without them. If shards \
 are missing in the directory, it checks the results of the complete shards, and prints how \
 many there are.
 
 Examples:
   tumble check results/manifest.jsonl
-  tumble check results")]
+  tumble check results
+  tumble check results --results-only")]
 pub(crate) struct Arguments {
     /// The manifest, or its directory
     manifest: PathBuf,
+    /// Check the results alone: inputs and files of options are not looked for
+    #[arg(long)]
+    results_only: bool,
     /// Print JSON: about the batch, and about results that differ and inputs without a result
     #[arg(long)]
     json: bool,
@@ -58,6 +64,8 @@ struct CheckReport<'a> {
     failed: Vec<&'a InputEntry>,
     /// Inputs that the batch has not come to.
     pending: BTreeSet<&'a str>,
+    /// Inputs and files of options that are not found, so that it is not known whether they have changed.
+    not_found: BTreeSet<&'a str>,
     /// Where the shards of a directory are not merged: how many are done.
     #[serde(skip_serializing_if = "Option::is_none")]
     shards: Option<String>,
@@ -137,7 +145,10 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         return Err(Failure::new(ALL_INPUTS, message));
     }
     let entries: Vec<&ManifestEntry> = lines.entries.values().collect();
-    let inputs = busy("checking inputs", || InputHashes::of(&entries));
+    let inputs = match arguments.results_only {
+        true => InputHashes::default(),
+        false => busy("checking inputs", || InputHashes::of(&entries)),
+    };
     let faults: Vec<(&ManifestEntry, Fault)> = busy("checking", || {
         let faulty = |entry| fault(folder, entry, &inputs).map(|fault| (entry, fault));
         on_threads(
@@ -150,7 +161,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         let output = output.display();
         words::error(&format!("{output}: {fault}"));
     }
-    inputs.note_missing(&entries);
+    let absent = inputs.absent(&entries);
     if lines.damaged > 0 {
         words::error(&format!(
             "{shown}: {} damaged",
@@ -173,12 +184,14 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
                 && lines.damaged == 0
                 && failed.is_empty()
                 && pending.is_empty()
+                && absent.is_empty()
                 && progress.is_none(),
             results: entries.len(),
             differ: differ.collect(),
             damaged_lines: lines.damaged,
             failed,
             pending,
+            not_found: absent.paths(),
             shards: progress.as_ref().map(ShardProgress::summary),
         })?;
     }
@@ -205,7 +218,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
     let is_made_again =
         faults.len() > of_removed_clips || !lines.unfinished_inputs().pending.is_empty();
+    let has_failed = !lines.unfinished_inputs().failed.is_empty();
     missing.extend(unfinished(&lines));
+    missing.extend(absent.texts());
     if !missing.is_empty()
         && let Some(progress) = &progress
     {
@@ -215,24 +230,34 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         let missing = missing.join(", ");
         // A manifest is recognised by its first line.
         let is_known = shards.is_some() || entry::open(folder).is_ok();
+        let is_pruned = of_removed_clips > 0 || !absent.orphans.is_empty();
         let remedy = match is_known {
             true if lines.damaged > 0 => {
                 "`--resume` does not recognise a result whose line is damaged: `tumble eval … --overwrite` \
                  makes all results again"
             }
-            true if is_made_again && of_removed_clips > 0 => {
-                "`tumble eval … --resume --prune` makes them again, and removes those of clips that are gone"
+            true if is_made_again && is_pruned => {
+                "`tumble eval … --resume --prune` makes them again, and removes those whose inputs or clips are gone"
             }
             true if is_made_again => "`tumble eval … --resume` makes them again",
-            true if of_removed_clips > 0 => {
-                "`tumble eval … --resume --prune` removes those of clips that are gone"
+            true if is_pruned => {
+                "`tumble eval … --resume --prune` removes those whose inputs or clips are gone"
             }
-            true => "`tumble eval … --resume` tries them again",
+            true if has_failed => "`tumble eval … --resume` tries them again",
+            true => "",
             false => {
                 "the first line of the manifest is damaged: `tumble eval … --overwrite` makes all results again"
             }
         };
-        return Err(Failure::new(DIFFERENCE, format!("{missing}; {remedy}")));
+        let elsewhere = match absent.elsewhere.is_empty() {
+            true => "",
+            false => {
+                "run it in the directory in which the batch ran, or add --results-only to check the results alone"
+            }
+        };
+        let parts = [&*missing, remedy, elsewhere];
+        let parts: Vec<&str> = parts.into_iter().filter(|part| !part.is_empty()).collect();
+        return Err(Failure::new(DIFFERENCE, parts.join("; ")));
     }
     let were = if entries.len() == 1 {
         "it was"
@@ -289,14 +314,57 @@ fn fault(folder: &Path, entry: &ManifestEntry, inputs: &InputHashes<'_>) -> Opti
     }
 }
 
-/// The hashes of inputs as they are now, by their paths in the manifest. Those that are not found have none: results
-/// may be checked on another machine than that of their inputs.
+/// The hashes of inputs as they are now, by their paths in the manifest. Those that are not found have none.
+#[derive(Default)]
 struct InputHashes<'a> {
     inputs: BTreeMap<&'a str, Option<String>>,
     /// The results, of all clips of an input together, that were made from the input as it is now.
     made: BTreeSet<&'a str>,
     /// Those of the files that options name.
-    of_options: BTreeMap<&'a str, String>,
+    of_options: BTreeMap<&'a str, Option<String>>,
+}
+
+/// Files that the results were made from and that are not found.
+#[derive(Default)]
+struct AbsentFiles<'a> {
+    /// Results whose inputs were removed from the directory that the batch was about.
+    orphans: Vec<&'a ManifestEntry>,
+    /// Other inputs, and files of options.
+    elsewhere: BTreeSet<&'a str>,
+}
+
+impl<'a> AbsentFiles<'a> {
+    fn is_empty(&self) -> bool {
+        self.orphans.is_empty() && self.elsewhere.is_empty()
+    }
+
+    fn paths(&self) -> BTreeSet<&'a str> {
+        let removed = self.orphans.iter().map(|entry| &*entry.input);
+        removed.chain(self.elsewhere.iter().copied()).collect()
+    }
+
+    fn texts(&self) -> Vec<String> {
+        let mut texts = Vec::new();
+        if let Some(first) = self.orphans.first() {
+            let results = words::count(self.orphans.len(), "result");
+            let have = if self.orphans.len() == 1 {
+                "has"
+            } else {
+                "have"
+            };
+            let first = &first.output;
+            texts.push(format!(
+                "{results} {have} no input any more (the first: {first})"
+            ));
+        }
+        if let Some(first) = self.elsewhere.first() {
+            let files = words::count(self.elsewhere.len(), "input file");
+            texts.push(format!(
+                "{files} not found (the first: {first}), so changes in them are not known"
+            ));
+        }
+        texts
+    }
 }
 
 impl<'a> InputHashes<'a> {
@@ -322,12 +390,14 @@ impl<'a> InputHashes<'a> {
         }
         let made = counts.into_iter().filter(|((_, all), found)| found >= all);
         let files = entries.iter().flat_map(|entry| &entry.option_files);
+        // Those without a hash could be read only once, as standard input.
+        let files = files.filter(|file| !file.sha256.is_empty());
         let paths: BTreeSet<&str> = files.map(|file| &*file.path).collect();
-        let found = paths.into_iter().filter(|path| Path::new(path).exists());
+        let hash = |path| Some(options::content(path)).filter(|_| Path::new(path).exists());
         Self {
             made: made.map(|((result, _), _)| result).collect(),
             inputs,
-            of_options: found.map(|path| (path, options::content(path))).collect(),
+            of_options: paths.into_iter().map(|path| (path, hash(path))).collect(),
         }
     }
 
@@ -343,7 +413,7 @@ impl<'a> InputHashes<'a> {
             });
         }
         let differs = |file: &&OptionFile| {
-            let now = self.of_options.get(&*file.path);
+            let now = self.of_options.get(&*file.path).and_then(Option::as_ref);
             now.is_some_and(|now| *now != file.sha256)
         };
         let file = entry.option_files.iter().find(differs)?;
@@ -353,33 +423,23 @@ impl<'a> InputHashes<'a> {
         )))
     }
 
-    /// Says how many results have no input any more, and how many inputs were not found to be compared.
-    fn note_missing(&self, entries: &[&ManifestEntry]) {
-        let missing: BTreeSet<&str> = (self.inputs.iter())
-            .filter_map(|(input, hash)| hash.is_none().then_some(*input))
-            .filter(|input| !Path::new(input).exists())
-            .collect();
-        let orphans = entries.iter().filter(|entry| {
-            missing.contains(&*entry.input)
-                && InputPresence::of_entry(entry) == InputPresence::Removed
-        });
-        let orphans: Vec<&ManifestEntry> = orphans.copied().collect();
-        let removed: BTreeSet<&str> = orphans.iter().map(|entry| &*entry.input).collect();
-        if let Some(first) = orphans.first() {
-            let results = words::count(orphans.len(), "result");
-            let have = if orphans.len() == 1 { "has" } else { "have" };
-            words::note(&format!(
-                "{results} {have} no input any more (`tumble eval … --resume --prune` removes what has none), the \
-                 first is {}",
-                first.output
-            ));
+    /// The inputs of results, and the files of options, that are not found or cannot be read.
+    fn absent(&self, entries: &[&'a ManifestEntry]) -> AbsentFiles<'a> {
+        let mut absent = AbsentFiles::default();
+        for &entry in entries {
+            if !self.inputs.get(&*entry.input).is_some_and(Option::is_none) {
+                continue;
+            }
+            match InputPresence::of_entry(entry) {
+                InputPresence::Removed => absent.orphans.push(entry),
+                InputPresence::Present | InputPresence::Unknown => {
+                    absent.elsewhere.insert(&*entry.input);
+                }
+            }
         }
-        let elsewhere = missing.len() - removed.len();
-        if elsewhere > 0 {
-            let inputs = words::count(elsewhere, "input");
-            words::note(&format!(
-                "{inputs} not found from this directory: whether they have changed was not checked"
-            ));
-        }
+        let files = self.of_options.iter();
+        let files = files.filter_map(|(path, hash)| hash.is_none().then_some(*path));
+        absent.elsewhere.extend(files);
+        absent
     }
 }

@@ -4,13 +4,15 @@ use std::borrow::Cow;
 
 use clap::Args;
 use tumble::{Device, Engine, EulerSequence, SampleTimes};
-use tumble_formats::Feature;
 use tumble_formats::dialect::write::WrittenDialect;
 use tumble_formats::format::{FormatOption, MotionOptions};
+use tumble_formats::learning::{Mirror, MirrorError, mirrored};
 use tumble_formats::motion::Motion;
+use tumble_formats::printable::printable;
 use tumble_formats::quaternion::ComponentOrder;
 use tumble_formats::sample::ChannelMethods;
 use tumble_formats::trim::{TrimError, trim};
+use tumble_formats::{Code, Diagnostic, Feature};
 
 use crate::arguments::input::Inputs;
 use crate::arguments::options::CommandLine;
@@ -23,6 +25,7 @@ use crate::arguments::time::{check_range, finite_seconds};
 use crate::batch::pipeline::{ClipWork, EvaluatedResult};
 use crate::batch::preview::PlannedWork;
 use crate::batch::target::ResultTarget;
+use crate::commands::features::mirror_axis;
 use crate::messages::exit::{ALL_INPUTS, Failure};
 use crate::messages::words;
 
@@ -40,7 +43,8 @@ Examples:
   tumble convert data/pendulum.dat --start 2.5 --end 8 -o part.dat
   tumble convert walk.bvh --tracks 'Left*' -o left.bvh
   tumble convert amass -o glb --to glb         a directory's tree
-  tumble convert walk.npz --up-axis y --scale 100 -o walk.bvh")]
+  tumble convert walk.npz --up-axis y --scale 100 -o walk.bvh
+  tumble convert walk.bvh --mirror x -o mirrored.bvh")]
 pub(crate) struct Arguments {
     #[command(flatten)]
     command_line: CommandLine,
@@ -56,6 +60,10 @@ pub(crate) struct Arguments {
     /// Where to end, seconds [default: the last key]
     #[arg(long, value_name = "SECONDS", value_parser = finite_seconds, allow_hyphen_values = true)]
     end: Option<f64>,
+    /// Mirror the motion: exchange left and right by the names of joints, and reverse the direction of this axis,
+    /// from left to right
+    #[arg(long, value_name = "AXIS", value_parser = mirror_axis())]
+    mirror: Option<usize>,
     /// The order of a quaternion's components [default: xyzw; CSV: wxyz]
     #[arg(long, value_parser = component_order())]
     order: Option<ComponentOrder>,
@@ -63,6 +71,9 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "AXES", value_parser = sequence)]
     sequence: Option<EulerSequence>,
 }
+
+/// The largest distance of a joint from the mirror image of its partner at rest, as a part of the size of the skeleton.
+const SYMMETRIC: f64 = 0.01;
 
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     check_range(arguments.start, arguments.end)?;
@@ -136,6 +147,50 @@ impl Arguments {
             .map_err(failed)
     }
 
+    /// The requested part of a clip, mirrored if that is asked for.
+    fn mirrored_part<'a>(
+        &self,
+        work: &ClipWork,
+        clip: &'a Motion,
+    ) -> Result<Cow<'a, Motion>, Failure> {
+        let name = &*work.name;
+        let part = self.part(name, clip)?;
+        let Some(axis) = self.mirror else {
+            return Ok(part);
+        };
+        let robot = self.inputs.reading.robot()?;
+        let tree = robot.as_ref().map(|robot| &robot.tree);
+        let (mirrored, report) = mirrored(&part, Mirror { axis, tree }).map_err(|error| {
+            let hint = match &error {
+                MirrorError::NoAxis { .. } => " (--robot)",
+                MirrorError::Axes { .. } => " (--mirror)",
+                _ => "",
+            };
+            Failure::input(
+                &Diagnostic::new(name, Code::Mirror, error.to_string()),
+                hint,
+            )
+        })?;
+        if let Some((joint, apart)) = report.asymmetry.filter(|(_, apart)| *apart > SYMMETRIC) {
+            let message = format!(
+                "`{}` is {:.0} % of the skeleton's size away from the mirror image of its partner at rest",
+                printable(&joint),
+                100.0 * apart
+            );
+            work.warn(Diagnostic::new(name, Code::NotSymmetric, message));
+        }
+        let pairs = words::count(report.pairs.len(), "pair");
+        let alone = match report.alone.len() {
+            0 => "no joint is".to_owned(),
+            1 => format!("`{}` is", printable(&report.alone[0])),
+            count => format!("{count} joints are"),
+        };
+        words::note(&format!(
+            "{name}: {pairs} of joints change their sides; {alone} mirrored in place"
+        ));
+        Ok(Cow::Owned(mirrored))
+    }
+
     fn convert(&self, work: &ClipWork) -> Result<EvaluatedResult, Failure> {
         let (name, clips, target) = (&*work.name, work.clips(), &work.target);
         if let Some(dialect) = self.dialect.chosen() {
@@ -143,9 +198,9 @@ impl Arguments {
         }
         let loaded = &work.input.loaded;
         let document = document_to_rewrite(work, self.makes_new(target))?;
-        let parts = clips.iter().map(|&clip| self.part(name, clip));
+        let parts = clips.iter().map(|&clip| self.mirrored_part(work, clip));
         let parts: Vec<Cow<'_, Motion>> = parts.collect::<Result<_, Failure>>()?;
-        let is_whole = (self.start, self.end) == (None, None);
+        let is_whole = (self.start, self.end) == (None, None) && self.mirror.is_none();
         let is_copy = document.is_some() && is_whole && !self.inputs.reading.changes_keys();
         let options = MotionOptions {
             order: self.order,
@@ -153,11 +208,23 @@ impl Arguments {
             box_length: loaded.box_length,
             ..target.motion_options()
         };
-        let written = match document.filter(|_| is_copy) {
-            Some(document) => {
+        // A channel of one side may be none of the other, so all animations of a glTF file are replaced.
+        let replaces = self.mirror.is_some() && target.format().supports(Feature::SeveralClips);
+        let written = match document {
+            Some(document) if is_copy => {
                 target.write_motion(|out| document.write(&[], &options, target.path(), out))?
             }
-            None => write_keys(name, &parts, document, &options, target)?,
+            Some(document) if replaces => {
+                if parts.iter().any(|part| part.set.scalar_count() > 0) {
+                    let message = "the weights of morph targets are left out".to_owned();
+                    work.warn(Diagnostic::new(name, Code::NoRoom, message));
+                }
+                let all: Vec<&Motion> = parts.iter().map(AsRef::as_ref).collect();
+                target.write_motion(|out| {
+                    document.write_instead(&all, &options, target.path(), out)
+                })?
+            }
+            document => write_keys(name, &parts, document, &options, target)?,
         };
         let done = format!("{}, {}", words::count(parts.len(), "clip"), keys(&parts),);
         Ok(work.result(written, &done, None))
@@ -177,7 +244,7 @@ impl Arguments {
             );
             return Err(Failure::usage(message));
         };
-        let part = self.part(name, clip)?;
+        let part = self.mirrored_part(work, clip)?;
         let times = part.key_times();
         let rate = part.rate.or_else(|| part.rate_of_keys());
         let spaced = rate.filter(|rate| {

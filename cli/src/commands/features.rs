@@ -12,7 +12,7 @@ use tumble_formats::format::Format;
 use tumble_formats::learning::{
     ContactLimits, FeatureRequest, FeatureSet, Ground, WorldFrames, feature_arrays, write_features,
 };
-use tumble_formats::motion::Motion;
+use tumble_formats::motion::{Joint, Motion};
 use tumble_formats::retarget::{Role, recognise};
 use tumble_formats::robot::{
     BodiesError, BodiesRequest, LimitRule, Robot, VelocityPoint, VelocitySource, bodies,
@@ -31,14 +31,14 @@ use crate::batch::preview::PlannedWork;
 use crate::messages::exit::{ALL_INPUTS, Failure};
 use crate::messages::words;
 
-/// Compute features for learning: six numbers of rotations, headings, contacts, mirrors, HumanML3D
+/// Compute features for learning: six numbers of rotations, headings, contacts, mirrors, HumanML3D, Kimodo
 #[derive(Debug, Args)]
 #[command(after_help = "\
 The result is an NPZ file with arrays of f32 for all frames and joints in the world, the times and the \
 names of the joints. With --robot the joints are the robot's bodies, and velocities are derivatives of the \
 curves; for other skeletons they are differences of poses 1/32 of a frame apart. HumanML3D needs metres, y \
 up, 20 frames a second and the 22 joints of SMPL, or of a skeleton that is recognised by its names; bodies of SMPL need \
---body-model.
+--body-model. Kimodo needs the same with joints that have the axes of the world at rest in a T-pose, as SMPL's, at any rate.
 
 Examples:
   tumble features walk.bvh --sets six-columns,heading -o walk.npz
@@ -86,11 +86,12 @@ fn sets() -> impl TypedValueParser<Value = FeatureSet> {
         FeatureSet::Contacts => "whether each joint touches the ground",
         FeatureSet::Mirror => "left and right exchanged",
         FeatureSet::Humanml3d => "the 263 numbers of HumanML3D",
+        FeatureSet::Kimodo => "the 273 numbers of Kimodo for the joints of SMPL",
     };
     one_of(FeatureSet::ALL.map(|set| (set.name(), help(set), set)))
 }
 
-fn mirror_axis() -> impl TypedValueParser<Value = usize> {
+pub(crate) fn mirror_axis() -> impl TypedValueParser<Value = usize> {
     one_of([
         ("x", "for y-up skeletons of people that face z", 0),
         ("y", "for z-up robots that face x", 1),
@@ -161,7 +162,8 @@ fn warn_of_other_units(name: &str, rate: FrameRate, poses: &WorldFrames) {
     if FrameRate::new(RATE, 1).is_ok_and(|of_set| of_set != rate) {
         words::warning(&format!(
             "{name}: HumanML3D has {RATE} frames a second, and its numbers are steps from frame to frame; these are of \
-             {rate} frames a second (--fps {RATE})"
+             {} (--fps {RATE})",
+            rate.in_words()
         ));
     }
     let first = &poses.positions[..poses.names.len().min(poses.positions.len())];
@@ -173,6 +175,21 @@ fn warn_of_other_units(name: &str, rate: FrameRate, poses: &WorldFrames) {
             "{name}: HumanML3D is in metres, and the body is {} units tall; is it in another unit? (--scale)",
             words::decimals(size)
         ));
+    }
+}
+
+/// Refuses skeletons whose joints have other axes at rest than those of SMPL, which are the axes of the world.
+fn check_rest(name: &str, clip: &Motion) -> Result<(), Failure> {
+    let is_turned = |joint: &&Joint| joint.rest.rotation.w.abs() < 1.0 - 1e-6;
+    match clip.skeleton.iter().find(is_turned) {
+        None => Ok(()),
+        Some(_) => Err(Failure::new(
+            ALL_INPUTS,
+            format!(
+                "{name}: Kimodo's rotations are those of SMPL, whose joints have the axes of the world at rest; `tumble \
+                 retarget --onto` carries the motion to such a skeleton"
+            ),
+        )),
     }
 }
 
@@ -211,7 +228,11 @@ impl Arguments {
                 Ground::Z => 1,
             }),
             humanml3d_joints: joints_of_smpl(&clip, &poses.names),
+            rate,
         };
+        if self.sets.contains(&FeatureSet::Kimodo) {
+            check_rest(name, &clip)?;
+        }
         if self.sets.contains(&FeatureSet::Humanml3d) {
             warn_of_other_units(name, rate, &poses);
         }

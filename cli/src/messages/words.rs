@@ -12,6 +12,7 @@ use std::time::Duration;
 
 use clap::error::{ContextKind, ContextValue};
 use tumble::names::by_meaning;
+pub(crate) use tumble::names::counted as count;
 use tumble_formats::guarded::is_guarded;
 use tumble_formats::printable::printable;
 use tumble_formats::{Diagnostic, Severity};
@@ -136,14 +137,6 @@ pub(crate) fn explain_panics() {
         ));
         line(&format!("  {}", words.join(" ")));
     }));
-}
-
-/// `1 track`, `4 tracks`.
-pub(crate) fn count(number: usize, noun: &str) -> String {
-    match number {
-        1 => format!("1 {noun}"),
-        _ => format!("{number} {noun}s"),
-    }
 }
 
 /// `1 box`, `4 boxes`.

@@ -4,10 +4,11 @@ use std::borrow::Cow;
 use std::io::BufRead;
 
 use glam::{DQuat, DVec3, Quat, Vec3};
+use tumble::names::counted;
 use tumble::{FrameRate, TrackSet};
 
 use crate::bvh::hierarchy::{FIRST_WORD, Hierarchy};
-use crate::diagnostic::{Code, Diagnostic, counted};
+use crate::diagnostic::{Code, Diagnostic};
 use crate::format::ReadOptions;
 use crate::motion::origin::{SMALL, origin_at_rest, relative};
 use crate::motion::{ChannelInterpolation, Channels, Joint, Motion, Transform};
@@ -71,8 +72,8 @@ impl FrameKeys {
         // Rows without numbers are blank lines.
         if (rows.count as u64) < frames && hierarchy.columns > 0 {
             let message = format!(
-                "{} rows of {frames} frames; is the file truncated?",
-                rows.count
+                "{} of {frames} frames; is the file truncated?",
+                counted(rows.count, "row")
             );
             return Err(lines.refuse_end(Code::BvhCut, message));
         }
@@ -266,8 +267,9 @@ fn read_rate<R: BufRead>(
         let message = match rate {
             Some(rate) => overridden(rate, other),
             None => format!(
-                "{}; because of --override-fps it is read at {other} frames a second",
-                out_of_range()
+                "{}; because of --override-fps it is read at {}",
+                out_of_range(),
+                other.in_words()
             ),
         };
         if rate != Some(other) {
@@ -285,8 +287,9 @@ fn read_rate<R: BufRead>(
             false => ("shorter", -100.0 * change),
         };
         let message = format!(
-            "the frame time {text} is read as that of {rate} frames a second, which makes the clip {percent:.1} % \
-             {longer}; --raw-times keeps {text}"
+            "the frame time {text} is read as that of {}, which makes the clip {percent:.1} % {longer}; --raw-times \
+             keeps {text}",
+            rate.in_words()
         );
         lines.warn(column, Code::FrameTimeRounded, message);
     }
@@ -364,7 +367,7 @@ fn wrong_count<R: BufRead>(lines: &Lines<R>, line: &str, columns: usize) -> Diag
     let found = tokens(line).count();
     let first_extra = tokens(line).nth(columns).map(|(column, _)| column);
     let column = first_extra.unwrap_or(line.trim_end().len() as u64 + 1);
-    let numbers = counted(found, "number", "numbers");
+    let numbers = counted(found, "number");
     let message = format!("{numbers} where {columns} are expected, one for each channel");
     lines.refuse(column, Code::BvhRow, message)
 }

@@ -222,7 +222,7 @@ fn loss(
         Feature::Scalars => (clip.set.scalar_count() > 0, "the scalars"),
         Feature::Limits => (
             clip.scalars.iter().any(|scalar| scalar.limits.is_some()),
-            "the limits of the joints",
+            "the limits of the joints (--robot sets them again when the file is read)",
         ),
         Feature::Steps => (
             clip.channels

@@ -3,12 +3,13 @@
 use std::io::{self, Write};
 
 use glam::{DQuat, DVec3};
-use tumble::names;
+use tumble::{FrameRate, names};
 
 use crate::array::Element;
 use crate::learning::contacts::{ContactLimits, contacts, majority};
 use crate::learning::heading::{Ground, twist_heading};
 use crate::learning::humanml3d::{HUMANML3D_JOINTS, HUMANML3D_NUMBERS, Humanml3dError, humanml3d};
+use crate::learning::kimodo::{KIMODO_NUMBERS, KimodoError, kimodo};
 use crate::learning::mirror::{mirror_pairs, mirrored_point, mirrored_rotation};
 use crate::learning::six::{SixOrder, six};
 use crate::npz::write::ArchiveWriter;
@@ -32,6 +33,8 @@ pub enum FeatureSet {
     Mirror,
     /// `humanml3d` (frames - 1, 263).
     Humanml3d,
+    /// `kimodo` (frames, 273).
+    Kimodo,
 }
 
 names! {
@@ -44,6 +47,7 @@ names! {
     Contacts => "contacts",
     Mirror => "mirror",
     Humanml3d => "humanml3d",
+    Kimodo => "kimodo",
 }
 
 /// Poses in the world, `[frame][joint]`.
@@ -74,8 +78,18 @@ pub struct FeatureRequest {
     pub window: usize,
     /// The axis across the mirror: 0 for x, 1 for y, 2 for z.
     pub mirror_axis: usize,
-    /// The joints of HumanML3D, in its order.
+    /// The joints of HumanML3D, in its order, which are Kimodo's too.
     pub humanml3d_joints: Option<[usize; HUMANML3D_JOINTS]>,
+    /// How many frames there are in a second.
+    pub rate: FrameRate,
+}
+
+impl FeatureRequest {
+    /// The joints of SMPL that a set needs.
+    fn joints_of(&self, set: FeatureSet) -> Result<[usize; HUMANML3D_JOINTS], FeatureError> {
+        let set = set.name();
+        self.humanml3d_joints.ok_or(FeatureError::NoJoints { set })
+    }
 }
 
 /// An array of features.
@@ -97,12 +111,21 @@ pub struct FeatureArray {
 pub enum FeatureError {
     /// A set needs joints that the skeleton does not have.
     #[error(
-        "humanml3d needs the 22 joints of SMPL, and the joints are not those of a known human skeleton"
+        "{set} needs the 22 joints of SMPL, and the joints are not those of a known human skeleton"
     )]
-    NoJoints,
+    NoJoints {
+        /// The name of the set.
+        set: &'static str,
+    },
+    /// Kimodo's features are of bodies that stand along y.
+    #[error("kimodo needs y up, and z points up (--up-axis y)")]
+    UpAxis,
     /// Poses without features.
     #[error(transparent)]
     Humanml3d(#[from] Humanml3dError),
+    /// Too few frames.
+    #[error(transparent)]
+    Kimodo(#[from] KimodoError),
 }
 
 /// The arrays of some sets, in their order.
@@ -188,8 +211,21 @@ pub fn feature_arrays(
                     ..array("mirror_pairs", &[], pairs)
                 }));
             }
+            FeatureSet::Kimodo => {
+                let order = request.joints_of(*set)?;
+                if request.ground != Ground::Y {
+                    return Err(FeatureError::UpAxis);
+                }
+                let at = |frame: usize| order.map(|joint| frame * joints + joint);
+                let positions = (0..frames).map(|frame| at(frame).map(|at| poses.positions[at]));
+                let rotations = (0..frames).map(|frame| at(frame).map(|at| poses.rotations[at]));
+                let positions: Vec<_> = positions.collect();
+                let rotations: Vec<_> = rotations.collect();
+                let rows = kimodo(&positions, &rotations, request.rate.per_second())?;
+                all.push(array("kimodo", &[KIMODO_NUMBERS], rows.concat()));
+            }
             FeatureSet::Humanml3d => {
-                let order = request.humanml3d_joints.ok_or(FeatureError::NoJoints)?;
+                let order = request.joints_of(*set)?;
                 let of_frame =
                     |frame: usize| order.map(|joint| poses.positions[frame * joints + joint]);
                 let positions: Vec<_> = (0..frames).map(of_frame).collect();

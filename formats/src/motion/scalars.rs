@@ -3,10 +3,12 @@
 use std::f32::consts::PI;
 
 use glam::Vec3;
+use tumble::names::counted;
 use tumble::{Channel, Error, ScalarKeys, TrackError, VectorMethod};
 
 use crate::motion::sample::{ChannelMethods, Samples};
 use crate::motion::{ChannelInterpolation, Motion};
+use crate::times::clock_text;
 
 /// The kind and the limits of a scalar of a clip; its name and its keys are in the clip's set.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -124,14 +126,14 @@ impl Motion {
         let degrees = (keys.keys[key + 1] - keys.keys[*key]).to_degrees();
         let others = match jumps.len() {
             1 => String::new(),
-            count => format!(" (and {} more joints)", count - 1),
+            count => format!(" (and {})", counted(count - 1, "more joint")),
         };
         Some(format!(
             "`{}` changes by {degrees:.0}° between its keys at {} and {} s{others}; if it was wrapped to one turn, unwrap \
              it (--robot does it for hinges without limits, numpy.unwrap for others)",
             keys.name,
-            keys.times[*key],
-            keys.times[key + 1]
+            clock_text(self.time_offset, keys.times[*key]),
+            clock_text(self.time_offset, keys.times[key + 1])
         ))
     }
 
@@ -155,7 +157,7 @@ impl Motion {
         let step = largest.next_up() - largest;
         let others = match all.len() {
             1 => String::new(),
-            count => format!(" (and {} more joints)", count - 1),
+            count => format!(" (and {})", counted(count - 1, "more joint")),
         };
         Some(format!(
             "`{name}`{others} reaches {largest:.0} rad{side}: keys are f32, whose steps are {step:.1e} rad there; shorter \

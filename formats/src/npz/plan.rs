@@ -8,10 +8,11 @@ mod unread;
 use std::ops::Range;
 
 use glam::DVec3;
+use tumble::names::counted;
 use tumble::{FrameRate, Layout};
 
 use crate::array::shape_text;
-use crate::diagnostic::{Code, Diagnostic, counted};
+use crate::diagnostic::{Code, Diagnostic};
 use crate::motion::WrittenJoint;
 use crate::motion::{Channels, Transform, circle};
 use crate::npz::archive::Archive;
@@ -307,8 +308,8 @@ impl ArchivePlan {
             let name = &archive.members[self.parts[0].member].name;
             let message = format!(
                 "the array has {} of {}; `{name}` has {} of {}",
-                counted(frames, "frame", "frames"),
-                counted(end, "track", "tracks"),
+                counted(frames, "frame"),
+                counted(end, "track"),
                 self.frames,
                 self.tracks
             );
@@ -395,8 +396,8 @@ impl ArchivePlan {
         if count == self.tracks {
             return Ok(());
         }
-        let entries = counted(count, "entry", "entries");
-        let tracks = counted(self.tracks, "track", "tracks");
+        let entries = counted(count, "entry");
+        let tracks = counted(self.tracks, "track");
         let message = format!("the array has {entries} for {tracks}");
         Err(archive.refuse(member, Code::Shape, message))
     }

@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 use std::f64::consts::TAU;
 
 use glam::{DQuat, DVec3};
+use tumble::names::counted;
 use tumble::trees::{BodyOrder, BodyPose, JointKind, Mimic, Siblings, Tree, TreeJoint};
 use tumble::{Channel, ScalarKeys, TrackError, TrackSet};
 
@@ -173,13 +174,20 @@ impl Robot {
 /// The scalars that are of the robot, with the names of its joints. If the file has its scalars in groups, such as
 /// `observation.state.left_knee` of `LeRobot`, these are the scalars of the groups with the robot's names.
 fn scalars_of_robot<'a>(
-    tree: &Tree,
+    tree: &'a Tree,
     clip: &'a Motion,
     warnings: &mut Warnings,
     refuse: &impl Fn(String) -> Diagnostic,
 ) -> Result<Vec<(usize, ScalarKeys<'a>)>, Diagnostic> {
     let joints = tree.bodies().iter().flat_map(|body| &body.joints);
     let joints: HashSet<&str> = joints.map(|joint| &*joint.name).collect();
+    let motors = motors(&joints);
+    let joint_of = |name: &str| {
+        joints
+            .get(name)
+            .or_else(|| motors.get(name)?.as_ref())
+            .copied()
+    };
     let all: Vec<(usize, ScalarKeys<'a>)> = clip.scalar_keys().enumerate().collect();
     if all.iter().any(|(_, keys)| joints.contains(keys.name)) {
         return Ok(all);
@@ -188,9 +196,11 @@ fn scalars_of_robot<'a>(
     let mut groups: BTreeMap<&str, HashSet<&str>> = BTreeMap::new();
     for (_, keys) in &all {
         let mut points = keys.name.match_indices('.');
-        let joint_at = points.find(|(point, _)| joints.contains(&keys.name[point + 1..]));
-        if let Some((point, _)) = joint_at {
+        let found = points.find_map(|(point, _)| {
             let (group, joint) = keys.name.split_at(point + 1);
+            Some((group, joint_of(joint)?))
+        });
+        if let Some((group, joint)) = found {
             groups.entry(group).or_default().insert(joint);
         }
     }
@@ -230,10 +240,31 @@ fn scalars_of_robot<'a>(
     }
     let named = of_robot.into_iter().map(|(index, mut keys)| {
         let before = group_of(&keys).map_or(0, |group| group.len());
-        keys.name = &keys.name[before..];
+        let name = &keys.name[before..];
+        keys.name = joint_of(name).unwrap_or(name);
         (index, keys)
     });
     Ok(named.collect())
+}
+
+/// The joints of a robot by the names of their motors in Unitree's programs: `kLeftElbow` of `left_elbow_joint`. `None`
+/// for a name of two joints.
+fn motors<'a>(joints: &HashSet<&'a str>) -> HashMap<String, Option<&'a str>> {
+    let mut motors = HashMap::new();
+    for joint in joints {
+        let words = joint.strip_suffix("_joint").unwrap_or(joint).split('_');
+        let mut motor = "k".to_owned();
+        for word in words {
+            let mut letters = word.chars();
+            motor.extend(letters.next().map(|first| first.to_ascii_uppercase()));
+            motor.push_str(letters.as_str());
+        }
+        let known = motors.entry(motor);
+        known
+            .and_modify(|known| *known = None)
+            .or_insert(Some(*joint));
+    }
+    motors
 }
 
 /// The scalars of joints with values of their own, and their names. Joints that follow others (`mimic`) are computed; a
@@ -415,8 +446,8 @@ fn choose(
             format!(" (and these, which follow them: {mimics})")
         });
         return Err(refuse(format!(
-            "the file has {} joints without names, and the robot {}: {}{mimics}",
-            names.len(),
+            "the file has {} without a name, and the robot {}: {}{mimics}",
+            counted(names.len(), "joint"),
             joints.len(),
             joints.join(", ")
         )));

@@ -720,7 +720,8 @@ fn wide_rows(names: &mut ColumnNames<'_>) -> Result<RowLayout, Diagnostic> {
              {}",
             names.list(),
             angles_hint(names).unwrap_or_else(|| {
-                "--map hand=LIST[3:7] selects a part of a list, hand=rx..rz:rotvec a range of columns"
+                "--map hand=LIST[3:7] selects a part of a list, hand=rx..rz:rotvec a range of columns, \
+                 knee=COLUMN:scalar:angle the angle of a joint, grip=COLUMN:scalar another number"
                     .to_owned()
             })
         );

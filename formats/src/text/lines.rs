@@ -204,25 +204,28 @@ impl<R: BufRead> Lines<R> {
 
     /// Counts a warning; the first of each code determines the location and the message.
     pub(crate) fn warn(&mut self, column: u64, code: Code, message: impl Into<String>) {
-        let warning = self.refuse(column, code, message.into());
-        self.count_warning(warning);
+        if !self.counts_again(code) {
+            let warning = self.refuse(column, code, message.into());
+            self.warnings.push(warning);
+        }
     }
 
     /// As [`Lines::warn`], about an earlier line as a whole.
     pub(crate) fn warn_line(&mut self, line: u64, code: Code, message: impl Into<String>) {
-        let warning = Diagnostic {
-            location: Some(Location::Text { line, column: 1 }),
-            ..self.refuse(1, code, message.into())
-        };
-        self.count_warning(warning);
+        if !self.counts_again(code) {
+            let warning = Diagnostic {
+                location: Some(Location::Text { line, column: 1 }),
+                ..self.refuse(1, code, message.into())
+            };
+            self.warnings.push(warning);
+        }
     }
 
-    fn count_warning(&mut self, warning: Diagnostic) {
+    /// Counts a warning of a code that is known.
+    fn counts_again(&mut self, code: Code) -> bool {
         let mut known = self.warnings.iter_mut();
-        match known.find(|known| known.code == warning.code) {
-            Some(known) => known.count += 1,
-            None => self.warnings.push(warning),
-        }
+        let known = known.find(|known| known.code == code);
+        known.map(|known| known.count += 1).is_some()
     }
 
     fn strip_line_end(&mut self) {

@@ -361,6 +361,7 @@ class Clip:
     def retime(self, *, speed: float | None = None, start: float | None = None) -> Clip:
         """Returns the clip, played `speed` times as fast. The first key is moved to `start` (in seconds); without `start`,
         the key stays at its time. Keys keep their bits; velocities and tangents are multiplied by the speed."""
+    def mirrored(self, axis: _Axis, *, robot: Robot | None = None) -> Clip: ...
     @staticmethod
     def concat(clips: Sequence[Clip], *, gap: float | None = None) -> Clip:
         """Several clips, one after another. Joints are matched by name, and have the order and the name of the first clip.
@@ -1595,6 +1596,8 @@ class ArrayDifference:
     def differing(self) -> int:
         """The number of numbers that differ."""
     @property
+    def not_finite(self) -> int: ...
+    @property
     def difference(self) -> Spread:
         """The differences of numbers."""
     @property
@@ -1670,8 +1673,8 @@ class ClipDifference:
     def identical(self) -> int:
         """The number of rotations whose bits are the same."""
     @property
-    def rotation(self) -> ChannelDifference:
-        """The differences of rotations in degrees."""
+    def rotation(self) -> ChannelDifference | None:
+        """The differences of rotations in degrees; None if the clips have only scalars in common."""
     @property
     def translation(self) -> ChannelDifference | None:
         """The differences of translations, as lengths; None if neither clip has translations."""
@@ -1681,6 +1684,10 @@ class ClipDifference:
     @property
     def joints(self) -> list[JointDifference]:
         """The differences of each track, in the order of the first clip."""
+    @property
+    def scalars(self) -> list[ChannelDifference]: ...
+    @property
+    def missing_scalars(self) -> tuple[list[str], list[str]]: ...
 
 @final
 class PathStatistics:

@@ -8,8 +8,10 @@ use glam::{DVec3, Vec3};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
+use tumble::names::counted;
 use tumble::{Channel, Device, Engine, Layout};
 use tumble_formats::join::{JoinError, join};
+use tumble_formats::learning::{Mirror, mirrored};
 use tumble_formats::motion::Motion;
 use tumble_formats::retime::retime;
 use tumble_formats::root_motion::{
@@ -19,14 +21,15 @@ use tumble_formats::trim::trim;
 
 use crate::arrays::{ListArgument, Order, number};
 use crate::build::{ClipArguments, ClipKeys, KeysLayout, put_scalars, scalar_keys};
-use crate::clip::{Clip, counted};
+use crate::clip::Clip;
 use crate::clip_shape::shaped;
 use crate::engine::{default_engine, layout_named};
 use crate::errors::{guarded, in_python, input, of_engine};
-use crate::features::heading_source;
+use crate::features::{axis_of, heading_source};
 use crate::names::option_named;
 use crate::options::frame_rate;
 use crate::pickle::{is_same, state};
+use crate::robot::Robot;
 use crate::run::work;
 use crate::sampler::Sampler;
 
@@ -453,6 +456,33 @@ impl Clip {
             retimed.map_err(|error| input(error.to_string()))
         })?;
         Ok(self.with_keys(retimed))
+    }
+
+    /// The mirror image of the clip at the plane through the origin across `axis`, "x", "y" or "z", from left to right.
+    /// Joints are exchanged with those of the same name on the other side (`features.mirror_pairs`), also if their axes at
+    /// rest are no mirror images; the skeleton stays as it is. Keys keep their times. The signs of a robot's joints depend
+    /// on their axes, which are those of `robot`.
+    ///
+    /// >>> import tumble
+    /// >>> clip = tumble.Clip([0.0, 1.0], [[0, 0, 0, 1], [0.6, 0, 0, 0.8]])
+    /// >>> clip.mirrored("y") == clip, clip.mirrored("y").mirrored("y") == clip
+    /// (False, True)
+    #[pyo3(signature = (axis, *, robot=None))]
+    fn mirrored(
+        &self,
+        py: Python<'_>,
+        axis: &Bound<'_, PyAny>,
+        robot: Option<&Bound<'_, Robot>>,
+    ) -> PyResult<Self> {
+        let axis = axis_of(axis)?;
+        let tree = robot.map(|robot| robot.get().tree().clone());
+        let motion = self.motion.clone();
+        let mirrored = work(py, motion.key_count(), move || {
+            let tree = tree.as_ref();
+            let mirrored = mirrored(&motion, Mirror { axis, tree });
+            mirrored.map_err(|error| input(error.to_string()))
+        })?;
+        Ok(self.with_keys(mirrored.0))
     }
 
     /// Several clips, one after another. Joints are matched by name, and have the order and the name of the first clip.

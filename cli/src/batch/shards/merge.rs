@@ -123,8 +123,9 @@ impl ShardProgress {
         let all = words::count(self.all, "shard");
         let first = self.first_missing;
         let first = first.map(|first| format!("; the first that is not is shard {first}"));
+        let are = if self.all == 1 { "is" } else { "are" };
         format!(
-            "{} of {all} are done{}",
+            "{} of {all} {are} done{}",
             self.done,
             first.unwrap_or_default()
         )

@@ -11,6 +11,7 @@ use tumble_formats::motion::ScalarKind;
 use tumble_formats::printable::printable;
 
 use crate::arguments::input::Inputs;
+use crate::commands::compare::text::not_finite;
 use crate::commands::compare::{Arguments, ComparisonReport};
 use crate::messages::exit::{ALL_INPUTS, DIFFERENCE, Failure, Outcomes};
 use crate::messages::{listing, names, words};
@@ -36,6 +37,8 @@ struct LargestDifferences {
     number: f64,
     /// Tracks and scalars that only one of the files has.
     missing: usize,
+    /// Numbers of arrays that are NaN or infinite in only one of the files; not in `number`.
+    not_finite: usize,
     /// Seconds that only one of the two has, and which are not compared.
     unshared_seconds: f64,
 }
@@ -162,7 +165,10 @@ impl LargestDifferences {
             ComparisonReport::Clips(clips) => clips.iter().for_each(|clip| all.add(clip)),
             ComparisonReport::Array(found) => match &found.rotation {
                 Some(rotation) => all.angle = rotation.largest,
-                None => all.number = found.difference.largest,
+                None => {
+                    all.number = found.difference.largest;
+                    all.not_finite = found.not_finite;
+                }
             },
             ComparisonReport::Trajectory(found) => {
                 for errors in found.ape.iter().chain(&found.rpe) {
@@ -178,7 +184,7 @@ impl LargestDifferences {
         let largest = |channel: &Option<ChannelDifference>| {
             channel.as_ref().map_or(0.0, |it| it.spread.largest)
         };
-        self.angle = self.angle.max(clip.rotation.spread.largest);
+        self.angle = self.angle.max(largest(&clip.rotation));
         self.distance = self.distance.max(largest(&clip.translation));
         self.number = self.number.max(largest(&clip.scale));
         for ScalarDifference {
@@ -204,7 +210,7 @@ impl LargestDifferences {
             self.number,
             self.unshared_seconds,
         ];
-        self.missing == 0 && numbers == [0.0; 4]
+        self.missing + self.not_finite == 0 && numbers == [0.0; 4]
     }
 }
 
@@ -228,8 +234,14 @@ impl FolderDifference {
                             parts.push(format!("{quantity} {}{unit}", words::decimals(number)));
                         }
                     }
+                    if found.not_finite > 0 {
+                        parts.push(not_finite(found.not_finite));
+                    }
                     if found.missing > 0 {
-                        parts.push(format!("{} tracks or scalars in only one", found.missing));
+                        parts.push(match found.missing {
+                            1 => "1 track or scalar in only one".to_owned(),
+                            count => format!("{count} tracks or scalars in only one"),
+                        });
                     }
                     if found.unshared_seconds > 0.0 {
                         let seconds = words::decimals(found.unshared_seconds);

@@ -15,14 +15,17 @@ use tumble_formats::compare::{
     ArrayDifference, ClipDifference, ClipPair, CompareError, PathDifference, PathMeasure,
     ScalarDifference,
 };
+use tumble_formats::format::FormatOption;
 use tumble_formats::motion::{Motion, ScalarKind};
 use tumble_formats::npz::open_numbers;
+use tumble_formats::quaternion::ComponentOrder;
+use tumble_formats::times::clock_text;
 use tumble_formats::trajectory::{Align, Associate, Step};
 use tumble_formats::{Code, Diagnostic, Format};
 
 use crate::arguments::input::{self, Inputs};
-use crate::arguments::output::one_of;
-use crate::arguments::time::{check_range, finite_seconds};
+use crate::arguments::output::{component_order, one_of};
+use crate::arguments::time::{check_range, clock_difference, finite_seconds};
 use crate::arguments::tolerance::{degrees, not_negative};
 use crate::batch::room;
 use crate::commands::compare::table::{TableArguments, csv_table};
@@ -57,7 +60,8 @@ Examples:
   tumble compare before/ after/ --tolerance 0.01deg
   tumble compare truth.tum estimate.tum --align sim3 --ape --rpe 1m
   tumble compare truth.tum estimate.tum --align se3 --ape --associate nearest:0.01
-  tumble compare truth.tum estimate.tum --ape --time-offset -0.25")]
+  tumble compare truth.tum estimate.tum --ape --time-offset -0.25
+  tumble compare truth.tum estimate.tum --ape --second-source-order wxyz")]
 pub(crate) struct Arguments {
     /// Two keyframe files, two results of `tumble eval`, or two directories of them
     #[command(flatten)]
@@ -72,8 +76,11 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "SECONDS", value_parser = finite_seconds, allow_hyphen_values = true)]
     end: Option<f64>,
     /// Seconds to add to the times of the second input, whose clock is another
-    #[arg(long, value_name = "SECONDS", value_parser = finite_seconds, allow_hyphen_values = true)]
+    #[arg(long, value_name = "SECONDS", value_parser = clock_difference, allow_hyphen_values = true)]
     time_offset: Option<f64>,
+    /// --source-order of the second input, where it is another than that of the first
+    #[arg(long, value_name = "ORDER", value_parser = component_order())]
+    second_source_order: Option<ComponentOrder>,
     /// Compare joints in the world instead of relative to their parents
     #[arg(long)]
     world: bool,
@@ -134,8 +141,7 @@ fn refused(error: CompareError) -> Failure {
     match error {
         CompareError::Evaluating { input, error } => Failure::evaluating(&input, &error),
         CompareError::NoTimeInBoth { spans, .. } | CompareError::NoPoseInBoth { spans, .. } => {
-            // The difference of two times, without its rounding.
-            let apart = ((spans[0][0] - spans[1][0]) * 1e9).round() / 1e9;
+            let apart = clock_text(0, spans[0][0] - spans[1][0]);
             let hint = format!(
                 "; --time-offset adds seconds to the times of the second ({apart} lets both begin together)"
             );
@@ -336,7 +342,7 @@ impl Arguments {
         }
         let [first, second] = [
             self.inputs.load_one(paths[0])?,
-            self.inputs.load_one(paths[1])?,
+            self.second_inputs(paths[1])?.load_one(paths[1])?,
         ];
         let names = paths.map(names::input);
         let track = |clip: &Motion, name: &str| {
@@ -376,6 +382,22 @@ impl Arguments {
         Ok((found, first.rest.and(second.rest)))
     }
 
+    /// How the second input is read.
+    fn second_inputs(&self, path: &Path) -> Result<Cow<'_, Inputs>, Failure> {
+        let Some(order) = self.second_source_order else {
+            return Ok(Cow::Borrowed(&self.inputs));
+        };
+        let format = self.inputs.format(path);
+        if !format.takes(FormatOption::SourceOrder) {
+            return Err(Failure::usage(format!(
+                "--second-source-order has no effect on {}; it is for {}; leave it out",
+                format.name,
+                Format::names_taking(FormatOption::SourceOrder)
+            )));
+        }
+        Ok(Cow::Owned(self.inputs.with_source_order(order)?))
+    }
+
     /// The arrays of two NPY files.
     fn arrays(&self, paths: [&Path; 2]) -> Result<ArrayDifference, Failure> {
         let options = self.inputs.options()?;
@@ -396,11 +418,15 @@ impl Arguments {
         if !all || has_options {
             return Ok(false);
         }
-        if self.fps.is_some() || self.world || self.distance.is_some() || self.time_offset.is_some()
+        if self.fps.is_some()
+            || self.world
+            || self.distance.is_some()
+            || self.time_offset.is_some()
+            || self.second_source_order.is_some()
         {
             return Err(Failure::usage(
-                "two arrays are compared number by number, without --fps, --world, --distance and --time-offset; \
-                 say what they mean (--source-fps, --map) to compare them as motions",
+                "two arrays are compared number by number, without --fps, --world, --distance, --time-offset and \
+                 --second-source-order; say what they mean (--source-fps, --map) to compare them as motions",
             ));
         }
         Ok(true)
@@ -411,7 +437,10 @@ impl Arguments {
         &self,
         paths: [&Path; 2],
     ) -> Result<(Vec<ClipDifference>, Result<(), Failure>), Failure> {
-        let loaded = [self.inputs.load(paths[0])?, self.inputs.load(paths[1])?];
+        let loaded = [
+            self.inputs.load(paths[0])?,
+            self.second_inputs(paths[1])?.load(paths[1])?,
+        ];
         let rest = (paths.iter().zip(&loaded))
             .try_for_each(|(path, loaded)| input::check_complete(&names::input(path), loaded));
         let counts = [0, 1].map(|side| loaded[side].clips.len());
@@ -519,10 +548,15 @@ impl Arguments {
         };
         let mut faults = Vec::new();
         match report {
-            ComparisonReport::Array(found) => faults.extend(match &found.rotation {
-                Some(rotation) => over("angle", rotation.largest, self.tolerance, "°"),
-                None => over("difference", found.difference.largest, self.tolerance, ""),
-            }),
+            ComparisonReport::Array(found) => {
+                faults.extend(match &found.rotation {
+                    Some(rotation) => over("angle", rotation.largest, self.tolerance, "°"),
+                    None => over("difference", found.difference.largest, self.tolerance, ""),
+                });
+                if found.not_finite > 0 && self.tolerance.is_some() {
+                    faults.push(text::not_finite(found.not_finite));
+                }
+            }
             ComparisonReport::Trajectory(found) => {
                 if let Some(absolute) = &found.ape {
                     faults.extend(over("angle", absolute.rotation.max, self.tolerance, "°"));
@@ -536,8 +570,10 @@ impl Arguments {
             }
             ComparisonReport::Clips(all) => {
                 for found in all {
-                    let angle = found.rotation.spread.largest;
-                    faults.extend(over("angle", angle, self.tolerance, "°"));
+                    if let Some(rotation) = &found.rotation {
+                        let angle = rotation.spread.largest;
+                        faults.extend(over("angle", angle, self.tolerance, "°"));
+                    }
                     if let Some(moved) = &found.translation {
                         let distance = moved.spread.largest;
                         faults.extend(over("distance", distance, self.distance, ""));

@@ -12,11 +12,14 @@ use crate::messages::words;
 
 /// Lines that say how far two clips are apart, with a table of the joints that are furthest apart.
 pub(super) fn of_clips(difference: &ClipDifference, table: TableArguments) -> String {
+    let compared = match difference.rotation {
+        Some(_) => words::count(difference.tracks, "track"),
+        None => words::count(difference.scalar_count, "scalar"),
+    };
     let mut text = format!(
-        "{} and {}: {} × {} from {} to {} s\n",
+        "{} and {}: {compared} × {} from {} to {} s\n",
         printable(&difference.inputs[0]),
         printable(&difference.inputs[1]),
-        words::count(difference.tracks, "track"),
         words::count(difference.samples, "sample"),
         words::seconds(difference.span[0]),
         words::seconds(difference.span[1])
@@ -33,13 +36,13 @@ pub(super) fn of_clips(difference: &ClipDifference, table: TableArguments) -> St
         };
         text += &format!("  {label:<12} {}{position}\n", spread(&found.spread, unit));
     };
-    line("rotation", "°", &difference.rotation);
-    for (label, found) in [
-        ("translation", &difference.translation),
-        ("scale", &difference.scale),
+    for (label, unit, found) in [
+        ("rotation", "°", &difference.rotation),
+        ("translation", "", &difference.translation),
+        ("scale", "", &difference.scale),
     ] {
         if let Some(found) = found {
-            line(label, "", found);
+            line(label, unit, found);
         }
     }
     for ScalarDifference {
@@ -53,11 +56,15 @@ pub(super) fn of_clips(difference: &ClipDifference, table: TableArguments) -> St
         };
         line(&format!("scalar {kind}"), unit, difference);
     }
-    text += &format!(
-        "  {} of {} rotations are the same, bit for bit\n",
-        difference.identical,
-        difference.tracks * difference.samples
-    );
+    if difference.tracks > 0 {
+        let all = difference.tracks * difference.samples;
+        text += &format!(
+            "  {} of {} {} the same, bit for bit\n",
+            difference.identical,
+            words::count(all, "rotation"),
+            if all == 1 { "is" } else { "are" }
+        );
+    }
     let lone = difference.missing.iter().zip(&difference.missing_scalars);
     for (side, (tracks, scalars)) in lone.enumerate() {
         let missing: Vec<&str> = tracks.iter().chain(scalars).map(String::as_str).collect();
@@ -78,6 +85,13 @@ fn spread(Spread { mean, rms, largest }: &Spread, unit: &str) -> String {
     format!("mean {mean}{unit}, rms {rms}{unit}, largest {largest}{unit}")
 }
 
+/// `2 numbers are NaN or infinite in only one`.
+pub(super) fn not_finite(count: usize) -> String {
+    let are = if count == 1 { "is" } else { "are" };
+    let numbers = words::count(count, "number");
+    format!("{numbers} {are} NaN or infinite in only one")
+}
+
 /// Lines that say how far two arrays are apart.
 pub(super) fn of_arrays(found: &ArrayDifference) -> String {
     let mut text = format!(
@@ -88,6 +102,12 @@ pub(super) fn of_arrays(found: &ArrayDifference) -> String {
         spread(&found.difference, ""),
         found.largest_at
     );
+    if found.not_finite > 0 {
+        text += &format!(
+            "  {}, not in the difference\n",
+            not_finite(found.not_finite)
+        );
+    }
     if let (Some(angles), Some(at)) = (&found.rotation, &found.largest_rotation_at) {
         text += &format!("  angle        {} at {at:?}\n", spread(angles, "°"));
     }

@@ -302,8 +302,9 @@ impl ShardSelection {
         let share = |part: usize, of: usize| (all as u128 * part as u128 / of as u128) as usize;
         match self {
             Self::One(one) if one > all => {
+                let are = if all == 1 { "is" } else { "are" };
                 let all = words::count(all, "shard");
-                let message = format!("--shard {one}: there are {all}");
+                let message = format!("--shard {one}: there {are} {all}");
                 Err(Failure::usage(message))
             }
             Self::One(one) => Ok(one..=one),

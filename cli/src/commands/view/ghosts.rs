@@ -1,6 +1,7 @@
 //! Which clips of several inputs are shown at once, at the same moment, and which of their joints are compared.
 
 use tumble_formats::compare::{ClipPair, CommonTimes, CompareError, MatchedTracks};
+use tumble_formats::times::clock_text;
 
 use crate::commands::compare::partner;
 use crate::commands::view::shown::{Ghost, ShownClip};
@@ -105,8 +106,8 @@ fn ghost_of(
     let both = format!("{first} and {second}");
     let mut lines = Vec::new();
     if common.warning.is_some() {
-        let clock = pair.clips[0].time_offset as f64;
-        let [start, end] = [common.start, common.end].map(|time| time + clock);
+        let clock = pair.clips[0].time_offset;
+        let [start, end] = [common.start, common.end].map(|time| clock_text(clock, time));
         lines.push(format!(
             "{both}: they have the times from {start} to {end} s in common; at others one is shown alone"
         ));

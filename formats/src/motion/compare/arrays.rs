@@ -21,6 +21,9 @@ pub struct ArrayDifference {
     pub numbers: usize,
     /// Number of elements whose bits differ; NaN values count as equal.
     pub differing: usize,
+    /// Number of elements whose difference is not finite: NaN or infinite in one array, and another value in the
+    /// other. [`difference`](Self::difference) is that of the others.
+    pub not_finite: usize,
     /// Absolute differences of the elements.
     pub difference: Spread,
     /// Indices of the element with the largest difference.
@@ -44,11 +47,13 @@ impl ArrayDifference {
             });
         }
         let mut difference = Tally::default();
-        let mut differing = 0;
+        let (mut differing, mut not_finite) = (0, 0);
         for (&a, &b) in first.values.iter().zip(&second.values) {
             let same = a.to_bits() == b.to_bits() || (a.is_nan() && b.is_nan());
+            let apart = if same { 0.0 } else { (a - b).abs() };
             differing += usize::from(!same);
-            difference.add(if same { 0.0 } else { (a - b).abs() });
+            not_finite += usize::from(!apart.is_finite());
+            difference.add(if apart.is_finite() { apart } else { 0.0 });
         }
         let angles = rotations(first).zip(rotations(second)).map(|(a, b)| {
             let mut tally = Tally::default();
@@ -60,6 +65,7 @@ impl ArrayDifference {
             shape: first.shape.clone(),
             numbers: first.values.len(),
             differing,
+            not_finite,
             difference: difference.times(1.0),
             largest_at: indices(difference.largest_at, &first.shape),
             rotation: angles.map(|tally| tally.times(1f64.to_degrees())),
@@ -117,6 +123,18 @@ mod tests {
             (found.largest_at, found.rotation.is_none()),
             (vec![1, 2], true)
         );
+    }
+
+    #[test]
+    fn numbers_without_a_difference_are_counted() {
+        let first = numbers(
+            &[5],
+            &[f64::NAN, f64::INFINITY, 1.0, f64::NAN, f64::INFINITY],
+        );
+        let second = numbers(&[5], &[f64::NAN, f64::INFINITY, 1.5, 2.0, 3.0]);
+        let found = ArrayDifference::of(["a", "b"], [&first, &second]).unwrap();
+        assert_eq!((found.differing, found.not_finite), (3, 2));
+        assert_eq!((found.difference.largest, found.largest_at), (0.5, vec![2]));
     }
 
     #[test]

@@ -14,6 +14,7 @@ use crate::motion::sample::{ChannelMethods, Samples};
 use crate::motion::scalars::ScalarKind;
 use crate::motion::world::world;
 use crate::names::{TRAJECTORY_TRACK, distinct_names};
+use crate::times::clock_text;
 
 /// Time spans whose ends differ by less than this are equal, in seconds: f32 times of some hours are not more exact.
 const SAME_END: f64 = 1e-3;
@@ -69,8 +70,8 @@ pub struct ClipDifference {
     pub unshared_seconds: f64,
     /// Number of rotations whose bits are equal, up to the sign of the quaternion.
     pub identical: u64,
-    /// Angles between the rotations, in degrees.
-    pub rotation: ChannelDifference,
+    /// Angles between the rotations, in degrees; `None` if the clips have only scalars in common.
+    pub rotation: Option<ChannelDifference>,
     /// Distances between the translations, in the files' unit of length; `None` if neither clip has translations.
     pub translation: Option<ChannelDifference>,
     /// Lengths of the differences of the scales; `None` if neither clip has scales.
@@ -143,6 +144,39 @@ pub struct ChannelDifference {
     pub frame: Option<f64>,
 }
 
+impl ChannelDifference {
+    /// The differences of all tracks, `all`, where the largest is that of this track.
+    fn with_largest(all: Spread, track: &str, of_track: TimedSpread) -> Self {
+        Self {
+            spread: all,
+            track: track.to_owned(),
+            time: of_track.time,
+            frame: of_track.frame,
+        }
+    }
+}
+
+/// A channel of a joint in a comparison; `None` if neither clip has it.
+type ChannelOf = fn(&JointDifference) -> Option<TimedSpread>;
+const ANGLE: ChannelOf = |joint| Some(joint.rotation);
+const DISTANCE: ChannelOf = |joint| joint.translation;
+const SCALE: ChannelOf = |joint| joint.scale;
+
+/// The joint with the largest difference of a channel, and this difference. Of joints with the same, it is the one with
+/// the largest difference of the other channel, as in a table of the joints.
+fn worst(joints: &[JointDifference], channels: [ChannelOf; 2]) -> Option<(&str, TimedSpread)> {
+    let key = |joint: &JointDifference| {
+        channels.map(|channel| channel(joint).map_or(0.0, |it| it.spread.largest))
+    };
+    let joint = joints
+        .iter()
+        .reduce(|worst, joint| match key(joint) > key(worst) {
+            true => joint,
+            false => worst,
+        })?;
+    Some((&joint.track, channels[0](joint)?))
+}
+
 /// The differences of one channel, of all tracks together and of each.
 struct ChannelTallies {
     all: Tally,
@@ -202,11 +236,12 @@ impl ClipPair<'_> {
             });
         }
         let warning = is_longer.then(|| {
+            let of_clock = |time: f64| clock_text(self.clips[0].time_offset, time);
             let [first, second] = [0, 1].map(|side| {
-                let [first, last] = on_clock(spans[side]);
+                let [first, last] = spans[side].map(of_clock);
                 format!("{} from {first} to {last} s", self.inputs[side])
             });
-            let [start, end] = on_clock([start, end]);
+            let [start, end] = [start, end].map(of_clock);
             format!(
                 "the clips have keys in different ranges of time: {first}, {second}; compared from {start} to {end} s"
             )
@@ -290,7 +325,7 @@ impl ClipPair<'_> {
     /// poses are relative to the world, otherwise to the parents.
     ///
     /// # Errors
-    /// * When no track of one clip corresponds to a track of the other.
+    /// * When no track and no scalar of one clip corresponds to one of the other.
     /// * When a track has another parent in the other clip, and the poses are relative to the parents.
     /// * When a clip cannot be sampled, or the poses in the world cannot be computed.
     pub fn differences(
@@ -300,8 +335,11 @@ impl ClipPair<'_> {
         in_world: bool,
     ) -> Result<ClipDifference, CompareError> {
         let (inputs, motions) = (self.inputs, self.clips);
+        let (scalar_pairs, missing_scalars) = self.scalar_pairs();
         let found = self.matched_joints()?;
-        self.check_any_pair(&found)?;
+        if scalar_pairs.is_empty() {
+            self.check_any_pair(&found)?;
+        }
         if in_world {
             self.check_known_parents(&found.matched.pairs)?;
         } else {
@@ -355,21 +393,6 @@ impl ClipPair<'_> {
             }
         };
         let name = |pair: &[usize; 2]| motions[0].set.track_name(pair[0]);
-        let of_all = |tallies: &ChannelTallies, factor| {
-            let (tally, count) = (tallies.all, pairs.len().max(1));
-            let index = tally.largest_at as usize;
-            let TimedSpread {
-                spread,
-                time,
-                frame,
-            } = timed(tally, index / count, factor);
-            ChannelDifference {
-                spread,
-                track: pairs.get(index % count).map_or_else(String::new, name),
-                time,
-                frame,
-            }
-        };
         let of_track = |tallies: &ChannelTallies, track: usize, factor| {
             let tally = tallies.each[track];
             timed(tally, tally.largest_at as usize, factor)
@@ -405,10 +428,17 @@ impl ClipPair<'_> {
                 scale: scales.as_ref().map(lengths),
             }
         });
-        let joints = joints.collect();
-        let lengths = |tallies: &ChannelTallies| of_all(tallies, 1.0);
-        let (scalar_pairs, missing_scalars) = self.scalar_pairs();
-        let mut each_scalar = Vec::new();
+        let joints: Vec<JointDifference> = joints.collect();
+        let of_all = |tallies: &ChannelTallies, channels, factor| {
+            let (track, largest) = worst(&joints, channels)?;
+            let all = tallies.all.times(factor);
+            Some(ChannelDifference::with_largest(all, track, largest))
+        };
+        let rotation = of_all(&angles, [ANGLE, DISTANCE], degrees);
+        let translation =
+            (translations.as_ref()).and_then(|found| of_all(found, [DISTANCE, ANGLE], 1.0));
+        let scale = (scales.as_ref()).and_then(|found| of_all(found, [SCALE, ANGLE], 1.0));
+        let mut each_scalar: Vec<ScalarDifference> = Vec::new();
         let scalars = ScalarKind::ALL.iter().filter_map(|&kind| {
             let of_kind = scalar_pairs
                 .iter()
@@ -425,31 +455,32 @@ impl ClipPair<'_> {
                     tallies.add(index, (a - b).abs());
                 }
             }
-            let largest = tallies.all.largest_at as usize;
-            let count = of_kind.len().max(1);
-            let factor = if kind == ScalarKind::Angle {
-                degrees
-            } else {
-                1.0
+            let factor = match kind {
+                ScalarKind::Angle => degrees,
+                _ => 1.0,
             };
-            let named = |index: usize, found: TimedSpread| {
-                let [scalar, _] = *of_kind.get(index)?;
+            let each = of_kind.iter().enumerate().filter_map(|(index, pair)| {
+                let found = of_track(&tallies, index, factor);
+                let name = motions[0].set.scalar(pair[0])?.name;
                 Some(ScalarDifference {
                     kind: kind.name(),
-                    difference: ChannelDifference {
-                        spread: found.spread,
-                        track: motions[0].set.scalar(scalar)?.name.to_owned(),
-                        time: found.time,
-                        frame: found.frame,
-                    },
+                    difference: ChannelDifference::with_largest(found.spread, name, found),
                 })
-            };
-            let each = (0..of_kind.len()).filter_map(|index| {
-                let found = of_track(&tallies, index, factor);
-                named(index, found)
+            });
+            let each: Vec<ScalarDifference> = each.collect();
+            let largest = |scalar: &ScalarDifference| scalar.difference.spread.largest;
+            let worst =
+                each.iter()
+                    .reduce(|worst, scalar| match largest(scalar) > largest(worst) {
+                        true => scalar,
+                        false => worst,
+                    });
+            let of_kind = worst.cloned().map(|mut worst| {
+                worst.difference.spread = tallies.all.times(factor);
+                worst
             });
             each_scalar.extend(each);
-            named(largest % count, timed(tallies.all, largest / count, factor))
+            of_kind
         });
         let scalars = scalars.collect();
         Ok(ClipDifference {
@@ -460,9 +491,9 @@ impl ClipPair<'_> {
             unshared_seconds: self.unshared_seconds(),
             span: [times.first(), times.last()].map(|time| time.copied().unwrap_or(0.0) + clock),
             identical,
-            rotation: of_all(&angles, degrees),
-            translation: translations.as_ref().map(lengths),
-            scale: scales.as_ref().map(lengths),
+            rotation,
+            translation,
+            scale,
             scalar_count: scalar_pairs.len(),
             missing_scalars,
             scalars,
@@ -603,7 +634,14 @@ impl ClipPair<'_> {
         if !found.matched.pairs.is_empty() {
             return Ok(());
         }
+        let scalars = self.clips.map(|clip| clip.set.scalar_count());
         let [first, second] = &found.joints;
+        if first.len() + second.len() == 0 && scalars != [0; 2] {
+            return Err(CompareError::NoScalarInBoth {
+                inputs: self.inputs.map(str::to_owned),
+                scalars,
+            });
+        }
         let error = first.order_of(second, self.inputs).err();
         if let Some(error @ JointMatchError::Unnamed { .. }) = error {
             return Err(error.into());

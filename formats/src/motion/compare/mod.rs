@@ -8,6 +8,7 @@ mod tally;
 use tumble::{Error, JointMatchError};
 
 use crate::motion::world::HierarchyError;
+use crate::times::clock_text;
 
 pub use crate::motion::compare::arrays::ArrayDifference;
 pub use crate::motion::compare::clips::{
@@ -23,6 +24,11 @@ fn hint(near: Option<&[String; 2]>) -> String {
     near.map_or_else(String::new, |[first, second]| {
         format!(" (`{first}` and `{second}` are near, but only equal names match)")
     })
+}
+
+/// A time, in seconds.
+fn short(time: f64) -> String {
+    clock_text(0, time)
 }
 
 fn in_world(error: &JointMatchError) -> &'static str {
@@ -48,6 +54,16 @@ pub enum CompareError {
         tracks: [usize; 2],
         /// A name of each clip that differ only in case, separators or a prefix.
         near: Option<[String; 2]>,
+    },
+    /// The clips have only scalars, and none of one clip corresponds to a scalar of the other.
+    #[error(
+        "{} and {}: have {} and {} scalars, none of the same name", inputs[0], inputs[1], scalars[0], scalars[1]
+    )]
+    NoScalarInBoth {
+        /// Names of the clips in messages.
+        inputs: [String; 2],
+        /// Number of scalars of each clip.
+        scalars: [usize; 2],
     },
     /// The names do not tell the tracks apart, or a track has another parent.
     #[error("{error}{}", in_world(error))]
@@ -83,7 +99,7 @@ pub enum CompareError {
     /// The time spans of the clips do not overlap.
     #[error(
         "no time lies in both: {} from {} to {} s, {} from {} to {} s",
-        inputs[0], spans[0][0], spans[0][1], inputs[1], spans[1][0], spans[1][1]
+        inputs[0], short(spans[0][0]), short(spans[0][1]), inputs[1], short(spans[1][0]), short(spans[1][1])
     )]
     NoTimeInBoth {
         /// Names of the clips in messages.
@@ -94,7 +110,7 @@ pub enum CompareError {
     /// The requested times lie outside those that both clips have.
     #[error(
         "{} and {}: times from {} to {} s are asked for, and both have times from {} to {} s",
-        inputs[0], inputs[1], range[0], range[1], common[0], common[1]
+        inputs[0], inputs[1], short(range[0]), short(range[1]), short(common[0]), short(common[1])
     )]
     RangeOutside {
         /// Names of the clips in messages.
@@ -113,7 +129,7 @@ pub enum CompareError {
     /// No pose of one path has one of the other at its time.
     #[error(
         "no pose of one lies at a time of the other: {} from {} to {} s, {} from {} to {} s; both need one clock",
-        inputs[0], spans[0][0], spans[0][1], inputs[1], spans[1][0], spans[1][1]
+        inputs[0], short(spans[0][0]), short(spans[0][1]), inputs[1], short(spans[1][0]), short(spans[1][1])
     )]
     NoPoseInBoth {
         /// Names of the clips in messages.

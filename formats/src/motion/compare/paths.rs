@@ -280,6 +280,12 @@ struct Association {
 /// Two times this close are one, in seconds: clocks that count from different seconds are rounded differently.
 const SAME_TIME: f64 = 1e-9;
 
+/// A pose beyond the ends of the other path belongs to its end if it is not further away than this, in seconds: f64 of
+/// seconds since 1970 have steps of 0.2 µs, and formats that store times as f32 round them further.
+fn same_end(time: f64) -> f64 {
+    (time.abs() * f64::from(f32::EPSILON)).clamp(5e-7, 1e-4)
+}
+
 /// Associates the poses of two paths by their times.
 fn associate(times: [&[f64]; 2], measure: &PathMeasure) -> Association {
     let start = times.map(|times| times.first().copied().unwrap_or(f64::INFINITY));
@@ -323,6 +329,7 @@ fn associate(times: [&[f64]; 2], measure: &PathMeasure) -> Association {
                 }
                 Some(time)
             }
+            (Associate::Interpolated, _, _) if apart <= same_end(time) => Some(nearest),
             (Associate::Interpolated, _, _) => None,
         };
         match other {
@@ -416,6 +423,19 @@ mod tests {
         assert_eq!((found.outside, found.in_gaps), (2, 1));
         let found = pairs(Associate::Interpolated, [&sparse, &dense]);
         assert_eq!((found.times_of, found.pairs.len()), (0, 2));
+    }
+
+    /// A path whose times are f32 ends a little before or after the other.
+    #[test]
+    fn ends_may_be_rounded() {
+        let end = f64::from(30.089_601_f32);
+        let (first, second) = ([0.0, 15.0, 30.0896], [0.0, 10.0, 20.0, end]);
+        assert!(first[2] != end);
+        let found = pairs(Associate::Interpolated, [&second, &first]);
+        assert_eq!((found.pairs.len(), found.outside), (4, 0));
+        assert_eq!(found.pairs[3], [end, 30.0896]);
+        let found = pairs(Associate::Interpolated, [&first, &[0.0, 10.0, 20.0, 30.0]]);
+        assert_eq!(found.outside, 1);
     }
 
     /// By `evo.core.sync.matching_time_indices`: the nearest pose of the longer trajectory within the limit.

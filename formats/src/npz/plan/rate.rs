@@ -1,6 +1,7 @@
 //! Frame rates in files: numbers that were rounded, perhaps several times.
 
 use tumble::FrameRate;
+use tumble::names::counted;
 
 use crate::array::Element;
 use crate::diagnostic::{Code, Diagnostic};
@@ -9,6 +10,7 @@ use crate::motion::grid;
 use crate::npz::archive::Archive;
 use crate::npz::plan::{ArchivePlan, read_numbers};
 use crate::rate::{Precision, RateSource, of, on_frames, overridden};
+use crate::times::clock_text;
 
 impl ArchivePlan {
     /// Reads the rate in the first of these arrays that exists. Of one that is not a rate, the error is kept.
@@ -49,8 +51,8 @@ impl ArchivePlan {
                 None => (self.rate, self.rate_member, before) = (Some(rate), Some(member), name),
                 Some(first) if first != rate => {
                     self.two_rates = Some(format!(
-                        "`{before}` says {first} frames a second, `{name}` {rate}; the first is used, \
-                         --override-fps replaces it"
+                        "`{before}` says {}, `{name}` {rate}; the first is used, --override-fps replaces it",
+                        first.in_words()
                     ));
                 }
                 Some(_) => {}
@@ -81,9 +83,11 @@ impl ArchivePlan {
         }
         self.two_rates.get_or_insert_with(|| {
             format!(
-                "the file states {rate} frames a second, but by `{name}` {} frames last {seconds} s, which is \
-                 {by_length:.3} a second; the first is used, --override-fps replaces it",
-                self.frames
+                "the file states {}, but by `{name}` {} last {} s, which is {by_length:.3} a second; the first is \
+                 used, --override-fps replaces it",
+                rate.in_words(),
+                counted(self.frames, "frame"),
+                clock_text(0, seconds)
             )
         });
     }
@@ -95,7 +99,9 @@ impl ArchivePlan {
         };
         let numbers = read_numbers(archive, member)?;
         if numbers.len() != self.frames {
-            let message = format!("{} numbers for {} frames", numbers.len(), self.frames);
+            let [found, frames] = [(numbers.len(), "number"), (self.frames, "frame")]
+                .map(|(count, noun)| counted(count, noun));
+            let message = format!("{found} for {frames}");
             return Err(archive.refuse(member, Code::Shape, message));
         }
         // Up to this limit, f64 represents every whole number exactly.
@@ -139,16 +145,17 @@ impl ArchivePlan {
                 let stated = self.rate.filter(|_| is_other(&other));
                 self.two_rates = match (stated, bad_rate) {
                     (None, Some(bad)) => Some(format!(
-                        "{}; because of --override-fps it is read at {other} frames a second",
-                        bad.message
+                        "{}; because of --override-fps it is read at {}",
+                        bad.message,
+                        other.in_words()
                     )),
                     (stated, _) => stated.map(|stated| overridden(stated, other)),
                 };
             } else if let Some(other) = options.source_rate.filter(is_other) {
                 self.two_rates = Some(format!(
-                    "the file states {rate} frames a second, which is used; --source-fps {other} is for files \
-                     that state \
-                     none, --override-fps replaces a rate"
+                    "the file states {}, which is used; --source-fps {other} is for files that state none, \
+                     --override-fps replaces a rate",
+                    rate.in_words()
                 ));
             }
             self.rate = Some(rate);
@@ -179,7 +186,9 @@ impl ArchivePlan {
             .step_by(columns.max(1));
         let mut times: Vec<f64> = column.collect();
         if times.len() != self.frames {
-            let message = format!("{} times for {} frames", times.len(), self.frames);
+            let [found, frames] = [(times.len(), "time"), (self.frames, "frame")]
+                .map(|(count, noun)| counted(count, noun));
+            let message = format!("{found} for {frames}");
             return Err(archive.refuse(list.member, Code::Shape, message));
         }
         if !array.header.element.is_float() && options.time_unit.is_none() {
@@ -217,7 +226,8 @@ impl ArchivePlan {
         };
         if let (Some(first), None, Some(found), false) = (self.rate, said, found, ends_between) {
             self.two_rates = Some(format!(
-                "the file states {first} frames a second, but its times have {found}; the times are used"
+                "the file states {}, but its times have {found}; the times are used",
+                first.in_words()
             ));
         }
         let between = self.rate.filter(|_| ends_between);

@@ -4,6 +4,7 @@ use std::collections::HashSet;
 use std::io;
 
 use tumble::Layout;
+use tumble::names::counted;
 
 use crate::array::shape_text;
 use crate::diagnostic::{Code, Diagnostic, Location};
@@ -108,7 +109,9 @@ impl ArchivePlan {
         };
         let count = columns - first;
         if let Some(names) = names.as_ref().filter(|names| names.len() != count) {
-            let message = format!("{} names for {count} scalars", names.len());
+            let [names, scalars] = [(names.len(), "name"), (count, "scalar")]
+                .map(|(count, noun)| counted(count, noun));
+            let message = format!("{names} for {scalars}");
             return Err(archive.refuse(member, Code::Shape, message));
         }
         let names = names.unwrap_or_else(|| {

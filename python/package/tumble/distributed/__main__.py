@@ -31,7 +31,7 @@ Options:
       --shard-bytes SIZE     The largest total size of the inputs in a shard [default: 32MiB]
       --worker-memory SIZE   The memory that a task reserves on its machine [default: none]
       --into files|parquet   Write a file for each clip, or a Parquet file for each shard [default: files]
-      --check OUT            Check results against their manifest, as `tumble check`, in object stores too
+      --check OUT            Check results against their manifest, in object stores too, as `tumble check --results-only`
       --json                 Print the report as JSON on standard output
   -h, --help                 Print this help; `tumble eval --help` has the other options
 

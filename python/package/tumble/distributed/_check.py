@@ -1,4 +1,4 @@
-"""Are the results in an object store still what they were? What `tumble check` does for directories."""
+"""Are the results in an object store still what they were? What `tumble check --results-only` does for directories."""
 
 from __future__ import annotations
 
