@@ -64,6 +64,7 @@ __all__ = [
     "panic",
     "path_errors",
     "positions_of_humanml3d",
+    "put_w_first",
     "reduce",
     "referred_files",
     "represent",
@@ -322,7 +323,7 @@ class Clip:
         continuity: float | None = None,
         bias: float | None = None,
     ) -> DeviceArray: ...
-    def select(self, tracks: Sequence[str] | Sequence[int]) -> Clip: ...
+    def select(self, tracks: Sequence[str] | Sequence[int], *, collapse: bool = False) -> Clip: ...
     def cut(self, start: float | None = None, end: float | None = None) -> Clip: ...
     def retime(self, *, speed: float | None = None, start: float | None = None) -> Clip: ...
     @staticmethod
@@ -880,7 +881,7 @@ class Engine:
     def blend(
         self,
         layers: Sequence[_Keys] | NDArray[Any],
-        weights: ArrayLike | None = None,
+        weights: ArrayLike | Sequence[ArrayLike] | None = None,
         *,
         order: _Order = "xyzw",
         out: _Single | None = None,
@@ -889,7 +890,7 @@ class Engine:
         self,
         first: _Keys,
         second: _Keys,
-        weight: float,
+        weight: ArrayLike,
         *,
         order: _Order = "xyzw",
         out: _Single | None = None,
@@ -1225,6 +1226,7 @@ def load_all(
     progress: Callable[[int, int], object] | None = None,
     fps: float | str | Fraction | None = None,
     tracks: Sequence[str] | Sequence[int] | None = None,
+    collapse: bool = False,
     method: str = "slerp",
 ) -> tuple[list[File], list[tuple[str, str | None, str]]]: ...
 def shaped(
@@ -1232,11 +1234,13 @@ def shaped(
     *,
     fps: float | str | Fraction | None = None,
     tracks: Sequence[str] | Sequence[int] | None = None,
+    collapse: bool = False,
     method: str = "slerp",
 ) -> Clip: ...
 def scalar_motions(
     clips: Sequence[Clip], method: str, ticks_per_second: int, *, contacts: bool
 ) -> tuple[Motions | None, list[str], list[int], str | None]: ...
+def put_w_first(quaternions: _Single) -> None: ...
 def represent(engine: Engine, rotations: _Single, kind: str, out: _Single) -> None: ...
 def clip_of_state(state: dict[str, Any]) -> Clip: ...
 def file_of_state(

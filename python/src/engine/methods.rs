@@ -574,8 +574,8 @@ impl Engine {
     ///
     /// `blend(layers, weights=None, *, order="xyzw", out=None)`
     ///
-    /// `layers`: a list of arrays (…, 4) of one shape, which is that of the result; `weights`: a number for each,
-    /// by default 1.
+    /// `layers`: a list of arrays (…, 4), whose shapes broadcast to that of the result; `weights`: for each a number, by default
+    /// 1, or an array of numbers, (…), such as one for each frame.
     ///
     /// >>> import tumble
     /// >>> tumble.Engine("cpu").blend([[[0, 0, 0, 1]], [[0, 0, 1, 0]]], [3, 3]).round(4)
@@ -593,17 +593,20 @@ impl Engine {
     }
 
     /// Slerp, the shorter way, from every rotation of the first array (…, 4) to that of the second, by a `weight`
-    /// from 0 to 1. Tracks are combined by index, as in `blend`.
+    /// from 0 to 1, or an array of weights, (…), such as one for each frame. The shapes broadcast. Tracks are combined by
+    /// index, as in `blend`.
     ///
     /// >>> import tumble
     /// >>> tumble.Engine("cpu").mix([0, 0, 0, 1], [0, 0, 1, 0], 0.5).round(4)
     /// array([0.    , 0.    , 0.7071, 0.7071], dtype=float32)
+    /// >>> tumble.Engine("cpu").mix([0, 0, 0, 1], [0, 0, 1, 0], [0.0, 0.5]).shape
+    /// (2, 4)
     #[pyo3(signature = (first, second, weight, *, order="xyzw", out=None))]
     fn mix<'py>(
         &self,
         first: &Bound<'py, PyAny>,
         second: &Bound<'py, PyAny>,
-        weight: f32,
+        weight: &Bound<'py, PyAny>,
         order: &str,
         out: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyAny>> {
