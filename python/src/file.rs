@@ -533,12 +533,14 @@ impl FileOptions {
                     return read;
                 };
                 let loaded = guarded(|| self.loaded(path));
-                // Nobody saves these clips, so the other contents of their files are not kept.
-                let loaded = loaded.map(|loaded| Loaded {
-                    document: None,
-                    ..loaded
-                });
-                read.push((index, loaded));
+                read.push((
+                    index,
+                    loaded.map(|mut loaded| {
+                        // These clips are not saved, so the other contents of their files are not kept.
+                        loaded.document = None;
+                        loaded
+                    }),
+                ));
             }
         };
         let threads = std::thread::available_parallelism().map_or(1, NonZero::get);

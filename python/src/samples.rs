@@ -312,7 +312,9 @@ pub(crate) fn blend<'py>(
                 engine.blend(&layers)
             }
             LayerWeights::Arrays(arrays) => {
-                let weights = arrays.iter().map(|array| broadcast(array, &target, "weights"));
+                let weights = arrays
+                    .iter()
+                    .map(|array| broadcast(array, &target, "weights"));
                 let weights: Vec<Cow<'_, [f32]>> = weights.collect::<PyResult<_>>()?;
                 let each = layers.iter().zip(&weights);
                 let layers: Vec<(&Rotations, &[f32])> =
@@ -685,9 +687,10 @@ pub(crate) fn of_values<'py, T, const N: usize>(
 pub(crate) fn weights(value: Option<&Bound<'_, PyAny>>) -> PyResult<Option<LayerWeights>> {
     let Some(value) = value else { return Ok(None) };
     let each = |items: &Bound<'_, PyAny>| {
-        let arrays = items.try_iter()?.enumerate().map(|(index, weights)| {
-            Ok(singles(doubles(&weights?, &format!("weights[{index}]"))?))
-        });
+        let arrays = items
+            .try_iter()?
+            .enumerate()
+            .map(|(index, weights)| Ok(singles(doubles(&weights?, &format!("weights[{index}]"))?)));
         arrays.collect::<PyResult<_>>().map(LayerWeights::Arrays)
     };
     Ok(Some(match doubles(value, "weights") {

@@ -175,6 +175,9 @@ def test_a_library_is_kept_in_a_file(clips, rng, tmp_path):
             assert np.array_equal(getattr(found, name), getattr(expected, name))
         assert copied.names == library.names and np.array_equal(copied.lengths, library.lengths)
         assert (copied.method, repr(copied)) == ("bessel-overhauser", repr(library))
+    many = tumble.MotionLibrary(100 * clips[3:])
+    many.save(tmp_path / "many.npz")
+    assert len(pickle.dumps(tumble.MotionLibrary.open(tmp_path / "many.npz"))) < 500
     mapped = again[0]._motions.arrays()["cells"]
     assert isinstance(mapped, np.memmap) and mapped.ctypes.data % 64 == 0
 

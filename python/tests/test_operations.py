@@ -307,7 +307,7 @@ def test_weights_may_differ_between_frames(rng, engine):
     assert np.array_equal(tracks[2], engine.mix(first[2], second[2], weights[2]))
     all_weights = rng.uniform(size=(2, 5, 7))
     assert np.array_equal(engine.blend([first, second], all_weights), engine.blend([first, second], list(all_weights)))
-    # Of many rotations, on threads.
+    # On threads, too.
     many = np.tile(first, (600, 1, 1, 1))
     assert np.array_equal(engine.mix(many, second, weights), np.broadcast_to(mixed, many.shape))
     assert engine.mix(first[:, :1], second, 0.5).shape == (5, 7, 4)

@@ -90,8 +90,10 @@ impl Engine {
             let mut poses = [[0.0; 4]; FEW_LAYERS];
             let mut weights = [0.0; FEW_LAYERS];
             if count > FEW_LAYERS {
-                let poses: Vec<[f32; 4]> =
-                    layers.iter().map(|(layer, _)| layer.as_arrays()[index]).collect();
+                let poses: Vec<[f32; 4]> = layers
+                    .iter()
+                    .map(|(layer, _)| layer.as_arrays()[index])
+                    .collect();
                 let weights: Vec<f32> = layers.iter().map(|(_, weights)| weights[index]).collect();
                 return pose_blend::pose(&poses, &weights, 1, 0);
             }
@@ -115,7 +117,9 @@ impl Engine {
     ) -> Result<Rotations, Error> {
         same_shape(from, to, 1)?;
         check_weight_count(weights.len(), from.as_arrays().len())?;
-        weights.iter().try_for_each(|&weight| check_fraction(weight))?;
+        weights
+            .iter()
+            .try_for_each(|&weight| check_fraction(weight))?;
         let [first, second] = [from, to].map(Rotations::as_arrays);
         self.each_on_host(from, |index| {
             pose_mix::pose(first[index], second[index], weights[index])
@@ -222,7 +226,9 @@ impl Engine {
         for (start, output) in (0..).step_by(HOST_WINDOW).zip(made.chunks_mut(HOST_WINDOW)) {
             let output = bytemuck::cast_slice_mut(output);
             let threads = self.machine.threads();
-            set_all(threads, VectorWidth::widest(), output, |index| pose(start + index))?;
+            set_all(threads, VectorWidth::widest(), output, |index| {
+                pose(start + index)
+            })?;
         }
         let (tracks, samples, layout) = like.shape();
         Ok(Rotations::new(Box::new(made), tracks, samples, layout))

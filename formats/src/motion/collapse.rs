@@ -98,14 +98,14 @@ impl Motion {
         let times = part.track_key_times();
         let samples = methods.sample(engine, &part, &SampleTimes::at(times.clone()))?;
         let at_rest = part.product_of(|joint| Similarity::at_rest(&part, joint))?;
-        let own = part.skeleton[0].rest;
+        let joint_rest = part.skeleton[0].rest;
         let mut product = Product {
             rest: Transform {
-                translation: own.translation,
-                rotation: (at_rest.rotation * own.rotation.as_dquat())
+                translation: joint_rest.translation,
+                rotation: (at_rest.rotation * joint_rest.rotation.as_dquat())
                     .normalize()
                     .as_quat(),
-                scale: (at_rest.scale * own.scale.as_dvec3()).as_vec3(),
+                scale: (at_rest.scale * joint_rest.scale.as_dvec3()).as_vec3(),
             },
             position: at_rest.point(part.rest_position(0)),
             rotations: Vec::with_capacity(times.len()),
@@ -229,7 +229,10 @@ impl Product {
     fn finish(self, index: usize, clip: &mut Motion) {
         if let Some(channels) = clip.channels.get_mut(index) {
             *channels = Channels {
-                translation: self.channels.translation.filter(|_| !self.positions.is_empty()),
+                translation: self
+                    .channels
+                    .translation
+                    .filter(|_| !self.positions.is_empty()),
                 ..self.channels
             };
         }

@@ -130,7 +130,10 @@ impl Table {
     }
 
     /// Refuses the first null of any column, except those of the columns of numbers that may have gaps. They are NaN.
-    pub(crate) fn check_nulls(&self, may_have_gaps: impl Fn(usize) -> bool) -> Result<(), Diagnostic> {
+    pub(crate) fn check_nulls(
+        &self,
+        may_have_gaps: impl Fn(usize) -> bool,
+    ) -> Result<(), Diagnostic> {
         let is_float = |column: &Column| {
             matches!(
                 column.values,

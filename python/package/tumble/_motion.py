@@ -1158,7 +1158,9 @@ class MotionLibrary(Generic[_A]):
 
     def __reduce__(self) -> tuple[Any, ...]:
         if self._file is not None:
-            return _opened, (self._file, self._engine, self._only, self._device, self._shard_indices)
+            # The file has the indices of all clips.
+            shard_indices = None if self._only is None else self._shard_indices
+            return _opened, (self._file, self._engine, self._only, self._device, shard_indices)
         return MotionLibrary._of_arrays, (self._arrays(), self._engine, None, self._device)
 
     def __len__(self) -> int:

@@ -405,11 +405,7 @@ impl Clip {
     /// >>> collapsed.parents, collapsed.keys("foot"), collapsed.offsets[1]
     /// ([None, 0], array([[ 0., -1.,  0.,  0.]], dtype=float32), array([0., 0., 0.], dtype=float32))
     #[pyo3(signature = (tracks, *, collapse=false))]
-    fn select(
-        slf: &Bound<'_, Self>,
-        tracks: &Bound<'_, PyAny>,
-        collapse: bool,
-    ) -> PyResult<Self> {
+    fn select(slf: &Bound<'_, Self>, tracks: &Bound<'_, PyAny>, collapse: bool) -> PyResult<Self> {
         let found = shaped(slf, None, Some(tracks), collapse, "authored")?;
         Ok(found.without_document())
     }

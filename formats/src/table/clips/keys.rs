@@ -113,7 +113,14 @@ impl TableClip<'_> {
             .first()
             .map_or(0, |track| shared.positions(track).len());
         let at_least = MIN_PARALLEL_ROWS.div_ceil(rows.max(1));
-        let alone = || shared.tracks.iter().zip(&are_needed).map(quiet_keys).collect();
+        let alone = || {
+            shared
+                .tracks
+                .iter()
+                .zip(&are_needed)
+                .map(quiet_keys)
+                .collect()
+        };
         let quiet: Vec<Option<RowKeys>> = match shared.tracks.len() <= at_least {
             true => alone(),
             false => tumble::on_threads(|| {
