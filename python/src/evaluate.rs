@@ -103,9 +103,22 @@ impl OutputForm {
         out: Option<&Bound<'py, PyAny>>,
         inputs: &[&Bound<'py, PyAny>],
     ) -> PyResult<Bound<'py, PyAny>> {
-        if self.as_vectors {
-            return self.vectors(py, engine, clip, request, out, inputs);
+        match self.as_vectors {
+            true => self.vectors(py, engine, clip, request, out, inputs),
+            false => self.numbers(py, engine, clip, request, out, inputs),
         }
+    }
+
+    /// As [`Self::of`], of a form that the engine evaluates.
+    fn numbers<'py>(
+        &self,
+        py: Python<'py>,
+        engine: impl FnOnce(usize) -> PyResult<Engine>,
+        clip: &Arc<Motion>,
+        request: &EvaluationKeywords,
+        out: Option<&Bound<'py, PyAny>>,
+        inputs: &[&Bound<'py, PyAny>],
+    ) -> PyResult<Bound<'py, PyAny>> {
         let samples = request.samples()?;
         let has_form = self.order != Order::Xyzw || self.encoding != Encoding::F32;
         if self.as_rotation && (has_form || out.is_some()) {
@@ -210,7 +223,8 @@ impl OutputForm {
         let samples = request.samples()?;
         if let SampleChoice::Ragged(lists) = samples {
             let engine = engine(lists.iter().map(Vec::len).sum())?;
-            let lists = rotations.of(py, |_| Ok(engine.clone()), clip, request, out, inputs)?;
+            let lists =
+                rotations.numbers(py, |_| Ok(engine.clone()), clip, request, out, inputs)?;
             let results = PyList::empty(py);
             for list in lists.try_iter()? {
                 let list = list?.cast_into::<PyArrayDyn<f32>>()?;
@@ -224,7 +238,7 @@ impl OutputForm {
         let shape = self.shape(samples, clip.set.track_count(), count, &[3]);
         let array = array(py, &shape, out, inputs)?;
         let engine = engine(clip.set.track_count() * count)?;
-        let found = rotations.of(py, |_| Ok(engine.clone()), clip, request, None, &[])?;
+        let found = rotations.numbers(py, |_| Ok(engine.clone()), clip, request, None, &[])?;
         write_vectors(&engine, &found.cast_into()?, &array)?;
         Ok(array.into_any())
     }
