@@ -38,6 +38,47 @@ fn matrices_are_those_of_the_encoding_whole_or_their_first_two_columns() {
     }
 }
 
+/// The shorter way, whichever quaternion of a rotation it is; on the threads of an engine, too.
+#[test]
+fn rotation_vectors_are_the_axis_times_the_angle() {
+    let axis = glam::DVec3::new(0.6, -0.48, 0.64);
+    let angles: Vec<f64> = (0..1000).map(|i| 0.00314 * f64::from(i)).collect();
+    let rotation = |(i, &angle): (usize, &f64)| {
+        let q = glam::DQuat::from_axis_angle(axis, angle).as_quat();
+        if i.is_multiple_of(2) {
+            q.to_array()
+        } else {
+            (-q).to_array()
+        }
+    };
+    let rotations: Vec<[f32; 4]> = angles.iter().enumerate().map(rotation).collect();
+    let engine = Engine::new(Device::Cpu).unwrap();
+    let mut all = vec![f32::NAN; 3000];
+    engine.rotation_vectors_into(&rotations, &mut all).unwrap();
+    for (found, &angle) in all.chunks_exact(3).zip(&angles) {
+        // f32 rounds w where the angle is near π.
+        let distance = glam::Vec3::from_slice(found)
+            .as_dvec3()
+            .distance(axis * angle);
+        assert!(distance < 3e-7, "{angle} {found:?}");
+    }
+    for count in [0, 1, 256, 257] {
+        let mut some = vec![f32::NAN; 3 * count];
+        engine
+            .rotation_vectors_into(&rotations[..count], &mut some)
+            .unwrap();
+        assert_eq!(some, all[..3 * count]);
+    }
+    let minus_one = [0.0, 0.0, 0.0, -1.0];
+    let mut none = [f32::NAN; 3];
+    engine
+        .rotation_vectors_into(&[minus_one], &mut none)
+        .unwrap();
+    assert_eq!(none.map(f32::to_bits), [0; 3]);
+    let refused = engine.rotation_vectors_into(&rotations[..2], &mut [0.0; 7]);
+    assert!(matches!(refused, Err(Error::EncodingLength(_))));
+}
+
 /// Frame by frame, on cards neighbouring invocations evaluate the same run of neighbouring tracks: more tracks than fill
 /// their lanes, keys on frames and off them, listed times, parts of a result, and components that are nearly 0.
 #[test]

@@ -24,7 +24,7 @@ use crate::motion::end_frame::{EndFrame, RateFrames};
 use crate::motion::keys::Duplicates;
 use crate::motion::poses::Poses;
 use crate::motion::signs::Signs;
-use crate::motion::{Motion, SampledClip, TrackName};
+use crate::motion::{Motion, SampledClip, TrackSelection};
 use crate::quaternion::ComponentOrder;
 use crate::times::FrameTimes;
 
@@ -165,9 +165,9 @@ pub struct ReadOptions {
     /// Whether a body model will supply the positions of joints ([`body_offsets`](crate::npz::body_offsets)), so that
     /// the shape in the file is used, and no warning is returned for it.
     pub has_body_model: bool,
-    /// The tracks that will be selected from the clips; `None`: all. Readers of NPZ and of pickles do not read the keys of
-    /// the other tracks, which then rest, and whose faults are no errors.
-    pub tracks: Option<Vec<TrackName>>,
+    /// The tracks that will be selected from the clips; `None`: all. Readers need not read the keys of the other tracks,
+    /// which then rest; numbers of theirs that are not finite are no errors.
+    pub tracks: Option<TrackSelection>,
 }
 
 /// The unit of times that are whole numbers.

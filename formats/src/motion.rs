@@ -3,6 +3,7 @@
 
 pub mod adjust;
 pub mod carried_mesh;
+pub mod collapse;
 pub mod compare;
 mod dense;
 pub mod end_frame;
@@ -22,6 +23,7 @@ pub mod sample;
 pub mod scalars;
 mod select;
 pub mod signs;
+mod similarity;
 pub mod skeleton;
 pub mod smooth;
 pub mod trajectory;
@@ -39,7 +41,7 @@ use crate::decimal::{Decimal, LARGEST_SECONDS, is_clock, offset_of};
 use crate::motion::origin::{coordinate, origin_at_rest, relative};
 pub use crate::motion::recorded::{RecordedBodies, RecordedRobot, RecordedSample};
 pub use crate::motion::scalars::{Scalar, ScalarKind};
-pub use crate::motion::select::TrackName;
+pub use crate::motion::select::{TrackName, TrackSelection};
 pub use crate::motion::written_joint::{WrittenChannel, WrittenJoint};
 use crate::names::same_named;
 

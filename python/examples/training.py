@@ -2,9 +2,10 @@
 them, the workers of a DataLoader, and 4 096 environments that step 1 000 times with velocities, on one thread and
 on two, and on a Vulkan device, with the contacts of the feet; then the same instances as a crowd. All are to have the
 same bits.
-Beside them NumPy, and torch and roma where they are installed.
+With --figures, beside NumPy, and torch and roma where they are installed: the time of a step and of windows, of reading
+the files, and the memory of 300 clips. Every time is the shortest of several runs.
 
-    python training.py [--files 1000] [--steps 1000] [--environments 4096]
+    python training.py --figures [--files 1000] [--steps 1000] [--environments 4096]
 """
 
 from __future__ import annotations
@@ -12,10 +13,12 @@ from __future__ import annotations
 import argparse
 import hashlib
 import multiprocessing
+import os
 import pathlib
 import tempfile
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -106,13 +109,21 @@ def load_in_workers(library: tumble.MotionLibrary) -> tuple[str, float, str]:
     return "torch's DataLoader", time.perf_counter() - started, bits.hexdigest()
 
 
-def shortest(work: Callable[[], Any], runs: int = 10) -> float:
-    best = float("inf")
+@dataclass(frozen=True)
+class Cost:
+    """Seconds that something took, and seconds of processors in all threads, which other programs disturb less."""
+
+    wall: float
+    processors: float
+
+
+def shortest(work: Callable[[], Any], runs: int = 20) -> Cost:
+    costs = []
     for _ in range(runs):
-        started = time.perf_counter()
+        started, used = time.perf_counter(), time.process_time()
         work()
-        best = min(best, time.perf_counter() - started)
-    return best
+        costs.append(Cost(time.perf_counter() - started, time.process_time() - used))
+    return Cost(min(cost.wall for cost in costs), min(cost.processors for cost in costs))
 
 
 class Tables:
@@ -140,23 +151,22 @@ class Tables:
         return found + [table[first] * (1 - s) + table[first + 1] * s for table in moved]
 
 
-def others(library: tumble.MotionLibrary, ids: Any, times: Any) -> dict[str, float]:
+def others(library: tumble.MotionLibrary, tables: Tables, ids: Any, times: Any) -> dict[str, Cost]:
     """Seconds of rotations alone and of five arrays in NumPy, and with torch and roma if they are installed."""
-    tables = Tables(library)
-    place = times * library.rates[ids]
+    place = np.clip(times, 0, library.lengths[ids]) * library.rates[ids]
     frame = np.minimum(place.astype(int), tables.counts[ids] - 2)
     first, t = tables.starts[ids] + frame, (place - frame).astype(np.float32)
 
     def by(module: Any, turned: Any, moved: Any, first: Any, t: Any) -> dict[str, Callable[[], Any]]:
         return {
             "rotations": lambda: tables.sample(module, turned[:1], [], first, t),
-            "all five arrays": lambda: tables.sample(module, turned, moved, first, t),
+            "five arrays": lambda: tables.sample(module, turned, moved, first, t),
         }
 
     found = {}
     with np.errstate(divide="ignore", invalid="ignore"):
         for name, work in by(np, tables.turned, tables.moved, first, t).items():
-            found[f"NumPy, {name}"] = shortest(work)
+            found[f"{name}: NumPy"] = shortest(work)
     try:
         import roma
         import torch
@@ -173,14 +183,132 @@ def others(library: tumble.MotionLibrary, ids: Any, times: Any) -> dict[str, flo
 
     for threads in (1, 2):
         torch.set_num_threads(threads)
+        on = f"{threads} thread{'s' if threads > 1 else ''}"
         for name, work in by(torch, turned, moved, rows, steps).items():
-            found[f"torch, {threads} threads, {name}"] = shortest(work)
-        found[f"roma, {threads} threads, rotations"] = shortest(by_roma)
+            found[f"{name}: torch, {on}"] = shortest(work)
+        found[f"rotations: roma, {on}"] = shortest(by_roma)
     return found
+
+
+def of_instances(library: tumble.MotionLibrary, ids: Any, times: Any) -> dict[str, Cost]:
+    """Seconds of the library for the same, and with other options."""
+    found: dict[str, Cost] = {}
+
+    def add(name: str, **options: Any) -> None:
+        state: Any = library.sample(ids, times, **options)
+        again = {option: value for option, value in options.items() if option != "arrays"}
+        found[name] = shortest(lambda: library.sample(ids, times, out=state, **again))
+
+    add("rotations: tumble", arrays=["rotations"])
+    for kind in ("matrix", "6d", "rotvec"):
+        add(f"rotations: tumble, {kind}", arrays=["rotations"], rotations=kind)
+    add("rotations: tumble, wxyz", arrays=["rotations"], order="wxyz")
+    add("five arrays: tumble", arrays=None)
+    add("five arrays: tumble, finite=True", finite=True)
+    return found
+
+
+def smooth(clips: list[tumble.Clip], ids: Any, times: Any) -> dict[str, Cost]:
+    """Seconds of five arrays of libraries whose method is smooth."""
+    found = {}
+    for method in ("bessel-overhauser", "c2"):
+        library = tumble.MotionLibrary(clips, method=method, skeleton=(PARENTS, OFFSETS))
+        of = ids % len(library)
+        at = np.minimum(times, library.lengths[of])
+        state = library.sample(of, at)
+        found[f"five arrays of {len(clips)} clips: {method}"] = shortest(lambda: library.sample(of, at, out=state))
+    return found
+
+
+def reading(folder: pathlib.Path) -> dict[str, Cost]:
+    """Seconds of reading all files: their arrays alone, and a library."""
+    paths = sorted(folder.glob("[0-9]*.npz"))
+
+    def arrays() -> None:
+        for path in paths:
+            with np.load(path) as file:
+                dict(file)
+
+    def library() -> None:
+        tumble.MotionLibrary.load(paths, skeleton=(PARENTS, OFFSETS))
+
+    return {
+        f"{len(paths)} files: np.load": shortest(arrays, 3),
+        f"{len(paths)} files: tumble.MotionLibrary.load": shortest(library, 3),
+    }
+
+
+def resident() -> int:
+    """Bytes of memory that this process has."""
+    with open("/proc/self/statm", encoding="ascii") as file:
+        return int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+
+
+def grown(folder: pathlib.Path, kind: str) -> int:
+    """Bytes by which a process grows that loads tables, or a library of the first 300 clips, and samples each."""
+    warm = tumble.MotionLibrary.load(folder / "0000.npz", skeleton=(PARENTS, OFFSETS))
+    warm.sample(0, 0.0)
+    before = resident()
+    if kind == "tables":
+        with np.load(folder / "tables.npz") as file:
+            kept: Any = dict(file)
+    else:
+        kept = tumble.MotionLibrary.load(
+            sorted(folder.glob("[0-9]*.npz"))[:300], skeleton=(PARENTS, OFFSETS), packed=kind == "packed"
+        )
+        kept.sample(np.arange(len(kept)), 0.5)
+    after = resident()
+    del kept
+    return after - before
+
+
+def print_memory(folder: pathlib.Path, tables: Tables) -> None:
+    """Bytes of 300 clips, each in a process of its own. Only Linux says them."""
+    if not os.path.exists("/proc/self/statm"):
+        return
+    rows = int(tables.counts[:300].sum())
+    arrays = [table[:rows] for table in tables.turned + tables.moved]
+    np.savez(folder / "tables.npz", *arrays)
+    first = 0
+    for kind in ("tables", "library", "packed"):
+        with multiprocessing.get_context("spawn").Pool(1) as pool:
+            grew = pool.apply(grown, (folder, kind))
+        first = first or grew
+        print(f"  {f'300 clips: {kind}':46} {grew / 1e6:9.2f} MB {grew / first:7.2f} ×")
+
+
+def print_figures(figures: dict[str, Cost]) -> None:
+    """Figures, and how many times the first of their group each is."""
+    bases: dict[str, Cost] = {}
+    for name, cost in figures.items():
+        base = bases.setdefault(name.split(":")[0], cost)
+        wall = f"{1e3 * cost.wall:9.2f} ms {cost.wall / base.wall:7.2f} ×"
+        processors = f"{1e3 * cost.processors:9.2f} ms of processors {cost.processors / base.processors:7.2f} ×"
+        print(f"  {name:46} {wall} {processors}")
+
+
+def print_all_figures(
+    library: tumble.MotionLibrary, clips: list[tumble.Clip], folder: pathlib.Path, ids: Any, times: Any
+) -> None:
+    """Everything that the top of this file names."""
+    tables = Tables(library)
+    print(f"{len(ids)} environments, and 512 windows of 10 states")
+    print_figures(others(library, tables, ids, times) | of_instances(library, ids, times))
+    starts = np.repeat(times[:512], 10) + np.tile(np.arange(10) / 30, 512)
+    in_windows = others(library, tables, np.repeat(ids[:512], 10), starts)
+    windows = library.sample_windows(ids[:512], times[:512], 10, fps=30)
+    in_windows["five arrays: tumble"] = shortest(
+        lambda: library.sample_windows(ids[:512], times[:512], 10, fps=30, out=windows)
+    )
+    print_figures({f"windows, {name}": figure for name, figure in in_windows.items()})
+    print_figures(smooth(clips[:200], ids, times))
+    print_figures(reading(folder))
+    print_memory(folder, tables)
 
 
 def main() -> None:
     parser = argparse.ArgumentParser()
+    parser.add_argument("--figures", action="store_true")
     parser.add_argument("--files", type=int, default=1000)
     parser.add_argument("--steps", type=int, default=1000)
     parser.add_argument("--environments", type=int, default=4096)
@@ -206,18 +334,8 @@ def main() -> None:
         rng = np.random.default_rng(4)
         ids = rng.integers(0, len(library), options.environments)
         times = library.sample_times(ids, rng)
-        state = library.sample(ids, times, arrays=["rotations"])
-        every = library.sample(ids, times)
-        figures = others(library, ids, times)
-        figures["tumble, rotations"] = shortest(lambda: library.sample(ids, times, out=state))
-        figures["tumble, all five arrays"] = shortest(lambda: library.sample(ids, times, out=every))
-        figures["tumble, … finite=True"] = shortest(lambda: library.sample(ids, times, out=every, finite=True))
-        windows = library.sample_windows(ids[:512], times[:512], 10, fps=30)
-        figures["tumble, 512 windows of 10"] = shortest(
-            lambda: library.sample_windows(ids[:512], times[:512], 10, fps=30, out=windows)
-        )
-        for name, seconds in figures.items():
-            print(f"  {name:34} {1e3 * seconds:8.2f} ms for {options.environments} environments")
+        if options.figures:
+            print_all_figures(library, clips, folder, ids, times)
 
         devices = {"one thread": tumble.Engine("cpu", threads=1), "two threads": tumble.Engine("cpu", threads=2)}
         try:

@@ -283,7 +283,7 @@ const LARGE: usize = 1 << 28;
 
 /// Allocates memory for the values of an argument. This may fail: a broadcast array may have more elements than memory
 /// has room for, because its elements share memory.
-fn room<T>(count: usize, label: &str) -> PyResult<Vec<T>> {
+pub(crate) fn room<T>(count: usize, label: &str) -> PyResult<Vec<T>> {
     check_room::<T>(count, label)?;
     let mut values = Vec::new();
     match values.try_reserve_exact(count) {

@@ -4,7 +4,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyString;
 use tumble::{Device, Engine, FrameRate, SampleTimes};
 use tumble_formats::adjust::JointOffsets;
-use tumble_formats::motion::{Motion, TrackName};
+use tumble_formats::motion::{Motion, TrackName, TrackSelection};
 use tumble_formats::sample::{ChannelMethods, MethodChoice};
 
 use crate::clip::Clip;
@@ -19,6 +19,8 @@ pub(crate) struct ClipShape {
     rate: Option<FrameRate>,
     /// The joints, in this order; `None`: all.
     joints: Option<Vec<TrackName>>,
+    /// Whether the motion of joints that are left out is added to that of their kept children.
+    collapse: bool,
     method: MethodChoice,
 }
 
@@ -27,22 +29,32 @@ impl ClipShape {
     pub(crate) fn new(
         fps: Option<&Bound<'_, PyAny>>,
         tracks: Option<&Bound<'_, PyAny>>,
+        collapse: bool,
         method: &str,
     ) -> PyResult<Self> {
         let rate = fps.map(frame_rate).transpose()?;
+        if collapse && tracks.is_none() {
+            return Err(input(
+                "collapse: without `tracks` no joint is left out; give the joints to keep as `tracks`",
+            ));
+        }
         Ok(Self {
             rate,
             joints: tracks.map(joint_names).transpose()?,
-            method: match rate {
-                Some(_) => method_named(method)?,
-                None => MethodChoice::default(),
+            collapse,
+            method: match rate.is_some() || collapse {
+                true => method_named(method)?,
+                false => MethodChoice::default(),
             },
         })
     }
 
-    /// The joints that are selected; `None`: all.
-    pub(crate) fn joints(&self) -> Option<&[TrackName]> {
-        self.joints.as_deref()
+    /// The tracks that are needed of a file; `None`: all.
+    pub(crate) fn selection(&self) -> Option<TrackSelection> {
+        Some(TrackSelection {
+            tracks: self.joints.clone()?,
+            with_ancestors: self.collapse,
+        })
     }
 
     /// Whether offsets are those of the selected joints, not of all joints of a file. Those with names are found by them.
@@ -72,6 +84,15 @@ impl ClipShape {
             });
         }
         let (count, all) = (offsets.joint_count(), clip.set.track_count());
+        if self.collapse {
+            return match count == all {
+                true => Ok(false),
+                false => Err(format!(
+                    "{count} offsets for {all} joints; with `collapse` give one for each joint of the file, in its order, or a \
+                     dict of x, y, z by the names of joints: those of joints that are left out are needed, too"
+                )),
+            };
+        }
         match (count == joints.len(), count == all) {
             (true, false) => Ok(true),
             (false, true) => Ok(false),
@@ -88,37 +109,55 @@ impl ClipShape {
         }
     }
 
-    /// The clip with the selected joints.
+    /// The clip with the selected joints. If the others collapse, those that are needed for it follow.
     ///
     /// # Errors
     /// The fault, to follow the name of the clip.
     pub(crate) fn selected(&self, clip: Motion) -> Result<Motion, String> {
         match &self.joints {
+            Some(joints) if self.collapse => with_ancestors(&clip, joints),
             Some(joints) => selected(&clip, joints),
             None => Ok(clip),
         }
     }
 
-    /// The clip at the rate.
+    /// A clip of [`Self::selected`] at the rate, without the joints that collapse.
     ///
     /// # Errors
     /// As [`Self::selected`].
     pub(crate) fn sampled(&self, clip: Motion) -> Result<Motion, String> {
-        match self.rate {
-            Some(rate) if clip.rate != Some(rate) => self.at_rate(&clip, rate),
-            _ => Ok(clip),
+        let sampled = match self.rate {
+            Some(rate) if clip.rate != Some(rate) => self.at_rate(&clip, rate)?,
+            _ => clip,
+        };
+        match &self.joints {
+            Some(joints) if joints.len() < sampled.set.track_count() => {
+                self.collapsed(&sampled, joints.len())
+            }
+            _ => Ok(sampled),
         }
+    }
+
+    fn methods(&self) -> ChannelMethods {
+        ChannelMethods {
+            method: self.method,
+            ..ChannelMethods::AUTHORED
+        }
+    }
+
+    /// The clip with its first `kept` joints, to which the motion of the others is added.
+    fn collapsed(&self, clip: &Motion, kept: usize) -> Result<Motion, String> {
+        let engine = Engine::new(Device::Cpu).map_err(|error| error.to_string())?;
+        let kept: Vec<usize> = (0..kept).collect();
+        let collapsed = clip.collapsed(&kept, &engine, &self.methods());
+        collapsed.map_err(|error| format!("collapse: {error}"))
     }
 
     /// The clip with its samples at the frames of a rate as keys. The end of a clip is its last frame: what follows is
     /// shorter than a frame.
     fn at_rate(&self, clip: &Motion, rate: FrameRate) -> Result<Motion, String> {
-        let methods = ChannelMethods {
-            method: self.method,
-            ..ChannelMethods::AUTHORED
-        };
         let engine = Engine::new(Device::Cpu).map_err(|error| error.to_string())?;
-        let samples = methods.sample(&engine, clip, &SampleTimes::rate(rate));
+        let samples = (self.methods()).sample(&engine, clip, &SampleTimes::rate(rate));
         let samples = samples.map_err(|error| error.to_string())?;
         let keyed = clip.with_keys(&samples);
         Ok(Motion {
@@ -189,7 +228,7 @@ fn selected(clip: &Motion, joints: &[TrackName]) -> Result<Motion, String> {
         // Without the parent, the position relative to it would be lost.
         if let Some(parent) = parent(track).filter(|parent| !tracks.contains(parent)) {
             return Err(format!(
-                "tracks: `{}` is a child of `{}`, which is left out; name that joint, too",
+                "tracks: `{}` is a child of `{}`, which is left out; name that joint, too, or give collapse=True",
                 name(track),
                 name(parent)
             ));
@@ -198,17 +237,27 @@ fn selected(clip: &Motion, joints: &[TrackName]) -> Result<Motion, String> {
     clip.select(&tracks).map_err(|error| error.to_string())
 }
 
+/// Some joints of a clip, in this order, and then their other ancestors.
+fn with_ancestors(clip: &Motion, joints: &[TrackName]) -> Result<Motion, String> {
+    let mut tracks = tracks(clip, joints)?;
+    let all = clip.with_ancestors(&tracks);
+    let others: Vec<usize> = all.into_iter().filter(|it| !tracks.contains(it)).collect();
+    tracks.extend(others);
+    clip.select(&tracks).map_err(|error| error.to_string())
+}
+
 /// The clip with some of its joints, `tracks`, by their names or indices, in this order, and with keys at a rate of
-/// `fps`, sampled by `method`.
+/// `fps`, sampled by `method`. `collapse`: the motion of joints that are left out is added to that of their children.
 #[pyfunction]
-#[pyo3(signature = (clip, *, fps=None, tracks=None, method="slerp"))]
+#[pyo3(signature = (clip, *, fps=None, tracks=None, collapse=false, method="slerp"))]
 pub(crate) fn shaped(
     clip: &Bound<'_, Clip>,
     fps: Option<&Bound<'_, PyAny>>,
     tracks: Option<&Bound<'_, PyAny>>,
+    collapse: bool,
     method: &str,
 ) -> PyResult<Clip> {
-    let shape = ClipShape::new(fps, tracks, method)?;
+    let shape = ClipShape::new(fps, tracks, collapse, method)?;
     let (py, clip) = (clip.py(), clip.get());
     let applied = |motion: Motion| shape.sampled(shape.selected(motion)?);
     let motion = py.detach(|| guarded(|| applied((*clip.motion).clone()).map_err(input)));

@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, PoisonError, Weak};
 
-use glam::{DQuat, DVec3, Quat};
+use glam::{DQuat, DVec3};
 use numpy::{PyArrayDyn, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::intern;
 use pyo3::prelude::*;
@@ -15,7 +15,6 @@ use tumble::{
 use tumble_cli::host;
 use tumble_formats::Diagnostic;
 use tumble_formats::motion::Motion;
-use tumble_formats::npz::rotation_vector;
 
 use crate::arrays::Order;
 use crate::device_array::DeviceArray;
@@ -104,9 +103,22 @@ impl OutputForm {
         out: Option<&Bound<'py, PyAny>>,
         inputs: &[&Bound<'py, PyAny>],
     ) -> PyResult<Bound<'py, PyAny>> {
-        if self.as_vectors {
-            return self.vectors(py, engine, clip, request, out, inputs);
+        match self.as_vectors {
+            true => self.vectors(py, engine, clip, request, out, inputs),
+            false => self.numbers(py, engine, clip, request, out, inputs),
         }
+    }
+
+    /// As [`Self::of`], of a form that the engine evaluates.
+    fn numbers<'py>(
+        &self,
+        py: Python<'py>,
+        engine: impl FnOnce(usize) -> PyResult<Engine>,
+        clip: &Arc<Motion>,
+        request: &EvaluationKeywords,
+        out: Option<&Bound<'py, PyAny>>,
+        inputs: &[&Bound<'py, PyAny>],
+    ) -> PyResult<Bound<'py, PyAny>> {
         let samples = request.samples()?;
         let has_form = self.order != Order::Xyzw || self.encoding != Encoding::F32;
         if self.as_rotation && (has_form || out.is_some()) {
@@ -194,7 +206,7 @@ impl OutputForm {
         kept.chain(each.iter().copied()).collect()
     }
 
-    /// Rotation vectors: quaternions are evaluated, and their logarithms taken in f64.
+    /// Rotation vectors, of quaternions that are evaluated first.
     fn vectors<'py>(
         &self,
         py: Python<'py>,
@@ -209,13 +221,15 @@ impl OutputForm {
             ..*self
         };
         let samples = request.samples()?;
-        if matches!(samples, SampleChoice::Ragged(_)) {
-            let lists = rotations.of(py, engine, clip, request, out, inputs)?;
+        if let SampleChoice::Ragged(lists) = samples {
+            let engine = engine(lists.iter().map(Vec::len).sum())?;
+            let lists =
+                rotations.numbers(py, |_| Ok(engine.clone()), clip, request, out, inputs)?;
             let results = PyList::empty(py);
             for list in lists.try_iter()? {
                 let list = list?.cast_into::<PyArrayDyn<f32>>()?;
                 let array = array(py, &[list.shape()[0], 3], None, &[])?;
-                write_vectors(&list, &array)?;
+                write_vectors(&engine, &list, &array)?;
                 results.append(array)?;
             }
             return Ok(results.into_any());
@@ -223,8 +237,9 @@ impl OutputForm {
         let (_, count) = request.resolved(clip)?;
         let shape = self.shape(samples, clip.set.track_count(), count, &[3]);
         let array = array(py, &shape, out, inputs)?;
-        let found = rotations.of(py, engine, clip, request, None, &[])?;
-        write_vectors(&found.cast_into()?, &array)?;
+        let engine = engine(clip.set.track_count() * count)?;
+        let found = rotations.numbers(py, |_| Ok(engine.clone()), clip, request, None, &[])?;
+        write_vectors(&engine, &found.cast_into()?, &array)?;
         Ok(array.into_any())
     }
 
@@ -496,22 +511,15 @@ impl OutputForm {
 
 /// Stores the rotation vectors of quaternions.
 pub(crate) fn write_vectors(
+    engine: &Engine,
     quaternions: &Bound<'_, PyArrayDyn<f32>>,
     vectors: &Bound<'_, PyArrayDyn<f32>>,
 ) -> PyResult<()> {
     let quaternions = quaternions.readonly();
-    let quaternions = quaternions.as_slice()?;
+    let quaternions = quaternions.as_slice()?.as_chunks().0;
     filled(vectors, |vectors| {
-        let pairs = quaternions
-            .as_chunks()
-            .0
-            .iter()
-            .zip(vectors.as_chunks_mut().0);
-        for (&quaternion, vector) in pairs {
-            let found = rotation_vector::shortest(Quat::from_array(quaternion));
-            *vector = found.as_vec3().to_array();
-        }
-        Ok(())
+        let stored = engine.rotation_vectors_into(quaternions, vectors);
+        stored.map_err(|error| of_engine(&error))
     })
 }
 

@@ -281,10 +281,12 @@ type SkippedFile = (PathBuf, Option<String>, String);
 
 /// Reads files of any format, as `load` does with the same keywords, on all threads, and warns once for each code: what
 /// `MotionLibrary.load` does. `skip`: files that cannot be read are left out and returned. `progress` is called with the
-/// number of files that were read and of all, now and then and at the end. `fps`, `tracks` and `method`: each clip is
-/// shaped as by `shaped`.
+/// number of files that were read and of all, now and then and at the end. `fps`, `tracks`, `collapse` and
+/// `method`: each clip is shaped as by `shaped`.
 #[pyfunction]
-#[pyo3(signature = (paths, keywords, *, skip=false, progress=None, fps=None, tracks=None, method="slerp"))]
+#[pyo3(signature = (
+    paths, keywords, *, skip=false, progress=None, fps=None, tracks=None, collapse=false, method="slerp"
+))]
 #[allow(clippy::too_many_arguments, reason = "keywords")]
 pub(crate) fn load_all(
     py: Python<'_>,
@@ -294,11 +296,12 @@ pub(crate) fn load_all(
     progress: Option<&Bound<'_, PyAny>>,
     fps: Option<&Bound<'_, PyAny>>,
     tracks: Option<&Bound<'_, PyAny>>,
+    collapse: bool,
     method: &str,
 ) -> PyResult<(Vec<File>, Vec<SkippedFile>)> {
     let mut request = FileOptions::new(LoadKeywords::of_dict(keywords)?)?;
-    request.shape = ClipShape::new(fps, tracks, method)?;
-    request.options.tracks = request.shape.joints().map(<[_]>::to_vec);
+    request.shape = ClipShape::new(fps, tracks, collapse, method)?;
+    request.options.tracks = request.shape.selection();
     let request = Arc::new(request);
     let (mut files, mut skipped) = (Vec::with_capacity(paths.0.len()), Vec::new());
     let mut warnings = Vec::new();
@@ -534,7 +537,15 @@ impl FileOptions {
                 let Some(path) = paths.get(index) else {
                     return read;
                 };
-                read.push((index, guarded(|| self.loaded(path))));
+                let loaded = guarded(|| self.loaded(path));
+                read.push((
+                    index,
+                    loaded.map(|mut loaded| {
+                        // These clips are not saved, so the other contents of their files are not kept.
+                        loaded.document = None;
+                        loaded
+                    }),
+                ));
             }
         };
         let threads = std::thread::available_parallelism().map_or(1, NonZero::get);
@@ -602,7 +613,7 @@ impl FileOptions {
             let placed = set_all_offsets(&mut loaded, &name, &numbers);
             placed.map_err(|error| input(format!("body_model: {name}: {error}")))?;
         }
-        if self.shape.joints().is_some() {
+        if self.shape.selection().is_some() {
             loaded.document = None;
             for clip in &mut loaded.clips {
                 *clip = self.shape.selected(std::mem::take(clip)).map_err(refuse)?;

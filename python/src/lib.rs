@@ -81,7 +81,7 @@ mod _tumble {
     #[pymodule_export]
     use crate::motions::scalars::scalar_motions;
     #[pymodule_export]
-    use crate::motions::{Motions, represent};
+    use crate::motions::{Motions, put_w_first, represent};
     #[pymodule_export]
     use crate::pickle::clip_of_state;
     #[pymodule_export]

@@ -682,7 +682,7 @@ impl Motions {
 }
 
 /// Fills an array with rotations in another representation: "matrix" (…, 3, 3), "6d" (…, 6), the first two columns, or
-/// "rotvec" (…, 3), of `rotations`, (…, 4), x y z w. Matrices are computed on the threads of the engine.
+/// "rotvec" (…, 3), of `rotations`, (…, 4), x y z w. They are computed on the threads of the engine.
 #[pyfunction]
 pub(crate) fn represent(
     engine: &Bound<'_, Engine>,
@@ -690,8 +690,9 @@ pub(crate) fn represent(
     kind: &str,
     out: &Bound<'_, PyArrayDyn<f32>>,
 ) -> PyResult<()> {
+    let engine = engine.get().engine_for(1)?;
     if kind == "rotvec" {
-        return write_vectors(rotations, out);
+        return write_vectors(&engine, rotations, out);
     }
     let order = match kind {
         "matrix" => MatrixOrder::RowMajor,
@@ -699,10 +700,22 @@ pub(crate) fn represent(
     };
     let read = rotations.try_readonly()?;
     let quaternions = read.as_slice()?.as_chunks().0;
-    let engine = engine.get().engine_for(1)?;
     filled(out, |numbers| {
         let encoded = engine.matrices_into(quaternions, order, numbers);
         encoded.map_err(|error| of_engine(&error))
+    })
+}
+
+/// Moves the w of quaternions, (…, 4), before x y z.
+#[pyfunction]
+pub(crate) fn put_w_first(quaternions: &Bound<'_, PyArrayDyn<f32>>) -> PyResult<()> {
+    filled(quaternions, |numbers| {
+        let (quaternions, _) = numbers.as_chunks_mut();
+        for quaternion in quaternions {
+            let [x, y, z, w] = *quaternion;
+            *quaternion = [w, x, y, z];
+        }
+        Ok(())
     })
 }
 

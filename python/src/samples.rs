@@ -1,5 +1,6 @@
 //! Functions from arrays of samples to arrays: smoothing, blending, mixing, adding, and poses along a skeleton.
 
+use std::borrow::Cow;
 use std::sync::Arc;
 
 use glam::{Affine3A, Mat3, Quat, Vec3};
@@ -7,6 +8,7 @@ use numpy::{PyArray1, PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::exceptions::PyTypeError;
 use pyo3::intern;
 use pyo3::prelude::*;
+use pyo3::types::{PyList, PyTuple};
 use tumble::{
     Layout, Rotations, Samples, SamplesError, Skeleton, Smoothing, SmoothingEnds, SmoothingError,
     SmoothingKernel, Transforms, Vectors,
@@ -14,7 +16,7 @@ use tumble::{
 use tumble_formats::diagnostic::Code;
 use tumble_formats::smooth::{SmoothJob, SmoothMotionError};
 
-use crate::arrays::{ArrayValues, Order, doubles, parts, quaternions};
+use crate::arrays::{ArrayValues, Order, doubles, parts, quaternions, room};
 use crate::clip::Clip;
 use crate::engine::Engine;
 use crate::errors::{input, input_at, of_engine, of_track};
@@ -66,12 +68,6 @@ fn of_samples(name: &str, error: &SamplesError) -> PyErr {
 
 fn rotations(values: &[Quat], tracks: usize, layout: Layout, name: &str) -> PyResult<Rotations> {
     Rotations::of(values, tracks, layout).map_err(|error| of_samples(name, &error))
-}
-
-/// Rotations (…, 4) of any shape, as one track.
-fn row(value: &Bound<'_, PyAny>, order: Order, name: &str) -> PyResult<(Vec<usize>, Rotations)> {
-    let ArrayValues { shape, values } = quaternions(value, order, name)?;
-    Ok((shape, rotations(&values, 1, Layout::TrackMajor, name)?))
 }
 
 /// The result as an array: this shape, and the components as the last axis.
@@ -249,31 +245,40 @@ fn vectors(value: &Bound<'_, PyAny>, name: &str) -> PyResult<(Vec<usize>, Vec<Ve
     Ok((shape, vectors.collect()))
 }
 
+/// The weights of layers.
+pub(crate) enum LayerWeights {
+    /// A number for each layer; none: 1 for each.
+    Numbers(Vec<f32>),
+    /// For each layer an array, whose shape broadcasts to that of the layers.
+    Arrays(Vec<ArrayValues<f32>>),
+}
+
+impl LayerWeights {
+    fn len(&self) -> usize {
+        match self {
+            Self::Numbers(numbers) => numbers.len(),
+            Self::Arrays(arrays) => arrays.len(),
+        }
+    }
+}
+
 /// `Engine.blend`: the normalised weighted sum of layers.
 pub(crate) fn blend<'py>(
     engine: &Engine,
     layers: &Bound<'py, PyAny>,
-    weights: Option<Vec<f32>>,
+    weights: Option<LayerWeights>,
     order: Order,
     out: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let py = layers.py();
     let mut all = Vec::new();
     let mut inputs = Vec::new();
-    let mut first: Option<Vec<usize>> = None;
     for (index, layer) in layers.try_iter()?.enumerate() {
-        let (layer, name) = (layer?, format!("layers[{index}]"));
-        let (shape, rotations) = row(&layer, order, &name)?;
-        check_shape(
-            &name,
-            &shape,
-            first.get_or_insert_with(|| shape.clone()),
-            "layers[0]",
-        )?;
-        all.push(rotations);
+        let layer = layer?;
+        all.push(quaternions(&layer, order, &format!("layers[{index}]"))?);
         inputs.push(layer);
     }
-    let weights = weights.unwrap_or_else(|| vec![1.0; all.len()]);
+    let weights = weights.unwrap_or_else(|| LayerWeights::Numbers(vec![1.0; all.len()]));
     if weights.len() != all.len() {
         return Err(input(format!(
             "weights: there are {} for {} layers",
@@ -281,15 +286,105 @@ pub(crate) fn blend<'py>(
             all.len()
         )));
     }
-    let shape = first.unwrap_or_default();
-    let count: usize = shape.iter().product();
+    let mut shapes: Vec<(String, &[usize])> = Vec::new();
+    for (index, layer) in all.iter().enumerate() {
+        shapes.push((format!("layers[{index}]"), &layer.shape));
+    }
+    if let LayerWeights::Arrays(arrays) = &weights {
+        for (index, array) in arrays.iter().enumerate() {
+            shapes.push((format!("weights[{index}]"), &array.shape));
+        }
+    }
+    let shape = common_shape(&shapes)?;
+    let layers = all.iter().enumerate().map(|(index, layer)| {
+        let name = format!("layers[{index}]");
+        let values = broadcast(layer, &shape, &name)?;
+        rotations(&values, 1, Layout::TrackMajor, &name)
+    });
+    let layers: Vec<Rotations> = layers.collect::<PyResult<_>>()?;
+    let count = size(&shape);
     let engine = engine.engine_for(count)?;
-    let found = work(py, count.saturating_mul(all.len()), move || {
-        let layers: Vec<(&Rotations, f32)> = all.iter().zip(weights).collect();
-        engine.blend(&layers).map_err(|error| of_engine(&error))
+    let target = shape.clone();
+    let found = work(py, count.saturating_mul(layers.len()), move || {
+        let blended = match weights {
+            LayerWeights::Numbers(weights) => {
+                let layers: Vec<(&Rotations, f32)> = layers.iter().zip(weights).collect();
+                engine.blend(&layers)
+            }
+            LayerWeights::Arrays(arrays) => {
+                let weights = arrays
+                    .iter()
+                    .map(|array| broadcast(array, &target, "weights"));
+                let weights: Vec<Cow<'_, [f32]>> = weights.collect::<PyResult<_>>()?;
+                let each = layers.iter().zip(&weights);
+                let layers: Vec<(&Rotations, &[f32])> =
+                    each.map(|(layer, weights)| (layer, &**weights)).collect();
+                engine.blend_each(&layers)
+            }
+        };
+        blended.map_err(|error| of_engine(&error))
     })?;
     let inputs: Vec<_> = inputs.iter().collect();
     written(py, &shape, &found, order, out, &inputs)
+}
+
+/// The shape to which all shapes broadcast, by NumPy's rules.
+fn common_shape(shapes: &[(String, &[usize])]) -> PyResult<Vec<usize>> {
+    let mut common: Vec<usize> = Vec::new();
+    for (name, shape) in shapes {
+        let added = shape.len().saturating_sub(common.len());
+        common.splice(0..0, std::iter::repeat_n(1, added));
+        let first = common.len() - shape.len();
+        for (size, &other) in common[first..].iter_mut().zip(*shape) {
+            match (*size, other) {
+                (size, other) if size == other => {}
+                (1, other) => *size = other,
+                (_, 1) => {}
+                _ => {
+                    return Err(input(format!(
+                        "{name}: its shape is {shape:?}, that of {} {:?} (without the components); give shapes that broadcast",
+                        shapes[0].0, shapes[0].1
+                    )));
+                }
+            }
+        }
+    }
+    Ok(common)
+}
+
+/// Values with a shape to which theirs broadcasts.
+fn broadcast<'a, T: Copy>(
+    array: &'a ArrayValues<T>,
+    shape: &[usize],
+    name: &str,
+) -> PyResult<Cow<'a, [T]>> {
+    if array.shape == shape {
+        return Ok(Cow::Borrowed(&array.values));
+    }
+    let first = shape.len() - array.shape.len();
+    let count = size(shape);
+    let mut values = room(count, name)?;
+    let value = |index: usize| {
+        let (mut rest, mut at, mut stride) = (index, 0, 1);
+        for (axis, &size) in shape.iter().enumerate().rev() {
+            let along = rest % size;
+            rest /= size;
+            if axis >= first && array.shape[axis - first] != 1 {
+                at += along * stride;
+            }
+            if axis >= first {
+                stride *= array.shape[axis - first];
+            }
+        }
+        array.values[at]
+    };
+    values.extend((0..count).map(value));
+    Ok(Cow::Owned(values))
+}
+
+/// The number of elements of a shape.
+fn size(shape: &[usize]) -> usize {
+    (shape.iter()).fold(1, |product, &size| product.saturating_mul(size))
 }
 
 fn check_shape(name: &str, shape: &[usize], first: &[usize], of: &str) -> PyResult<()> {
@@ -307,18 +402,31 @@ fn check_shape(name: &str, shape: &[usize], first: &[usize], of: &str) -> PyResu
 pub(crate) fn mix<'py>(
     engine: &Engine,
     [first, second]: [&Bound<'py, PyAny>; 2],
-    weight: f32,
+    weight: &Bound<'py, PyAny>,
     order: Order,
     out: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let py = first.py();
-    let (shape, from) = row(first, order, "first")?;
-    let (other, to) = row(second, order, "second")?;
-    check_shape("second", &other, &shape, "first")?;
-    let count = from.as_arrays().len();
-    let engine = engine.engine_for(count)?;
-    let found = work(py, count, move || {
-        let found = engine.mix(&from, &to, weight);
+    let from = quaternions(first, order, "first")?;
+    let to = quaternions(second, order, "second")?;
+    let weights = singles(doubles(weight, "weight")?);
+    let shape = common_shape(&[
+        ("first".to_owned(), &from.shape),
+        ("second".to_owned(), &to.shape),
+        ("weight".to_owned(), &weights.shape),
+    ])?;
+    let row = |array, name| {
+        let values = broadcast(array, &shape, name)?;
+        rotations(&values, 1, Layout::TrackMajor, name)
+    };
+    let (from, to) = (row(&from, "first")?, row(&to, "second")?);
+    let engine = engine.engine_for(from.as_arrays().len())?;
+    let target = shape.clone();
+    let found = work(py, from.as_arrays().len(), move || {
+        let found = match weights.values[..] {
+            [weight] => engine.mix(&from, &to, weight),
+            _ => engine.mix_each(&from, &to, &broadcast(&weights, &target, "weight")?),
+        };
         found.map_err(|error| of_engine(&error))
     })?;
     written(py, &shape, &found, order, out, &[first, second])
@@ -576,14 +684,36 @@ pub(crate) fn of_values<'py, T, const N: usize>(
 }
 
 /// The weights of layers.
-pub(crate) fn weights(value: Option<&Bound<'_, PyAny>>) -> PyResult<Option<Vec<f32>>> {
+pub(crate) fn weights(value: Option<&Bound<'_, PyAny>>) -> PyResult<Option<LayerWeights>> {
     let Some(value) = value else { return Ok(None) };
-    match doubles(value, "weights")? {
-        ArrayValues { shape, values } if shape.len() == 1 => Ok(Some(
-            values.into_iter().map(|weight| weight as f32).collect(),
-        )),
-        _ => Err(PyTypeError::new_err(
-            "weights: give a list of numbers, one for each layer",
-        )),
+    let each = |items: &Bound<'_, PyAny>| {
+        let arrays = items
+            .try_iter()?
+            .enumerate()
+            .map(|(index, weights)| Ok(singles(doubles(&weights?, &format!("weights[{index}]"))?)));
+        arrays.collect::<PyResult<_>>().map(LayerWeights::Arrays)
+    };
+    Ok(Some(match doubles(value, "weights") {
+        Ok(weights) if weights.shape.len() == 1 => LayerWeights::Numbers(singles(weights).values),
+        Ok(weights) if weights.shape.is_empty() => {
+            return Err(PyTypeError::new_err(
+                "weights: give a list with a number or an array for each layer",
+            ));
+        }
+        // Arrays of different shapes.
+        Err(_) if value.is_instance_of::<PyList>() || value.is_instance_of::<PyTuple>() => {
+            each(value)?
+        }
+        found => {
+            found?;
+            each(value)?
+        }
+    }))
+}
+
+fn singles(numbers: ArrayValues<f64>) -> ArrayValues<f32> {
+    ArrayValues {
+        values: numbers.values.iter().map(|&number| number as f32).collect(),
+        shape: numbers.shape,
     }
 }

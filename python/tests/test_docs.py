@@ -147,7 +147,10 @@ def test_types_are_those_of_the_stubs(tmp_path):
 
 def test_the_package_and_its_users_pass_strict_checks(tmp_path):
     (tmp_path / "user.py").write_text(USER, encoding="utf-8")
-    mypy("mypy", "--strict", "-p", "tumble", "-m", "user", cwd=tmp_path)
+    page = (ROOT / "docs" / "training.md").read_text(encoding="utf-8")
+    blocks = re.findall(r"^```python\n(.*?)^```", page, re.MULTILINE | re.DOTALL)
+    (tmp_path / "trainer.py").write_text("\n".join(blocks), encoding="utf-8")
+    mypy("mypy", "--strict", "-p", "tumble", "-m", "user", "-m", "trainer", cwd=tmp_path)
 
 
 USER = '''

@@ -175,6 +175,9 @@ def test_a_library_is_kept_in_a_file(clips, rng, tmp_path):
             assert np.array_equal(getattr(found, name), getattr(expected, name))
         assert copied.names == library.names and np.array_equal(copied.lengths, library.lengths)
         assert (copied.method, repr(copied)) == ("bessel-overhauser", repr(library))
+    many = tumble.MotionLibrary(100 * clips[3:])
+    many.save(tmp_path / "many.npz")
+    assert len(pickle.dumps(tumble.MotionLibrary.open(tmp_path / "many.npz"))) < 500
     mapped = again[0]._motions.arrays()["cells"]
     assert isinstance(mapped, np.memmap) and mapped.ctypes.data % 64 == 0
 
@@ -512,6 +515,15 @@ def test_rotations_have_the_representation_that_is_asked_for(clips, rng):
         columns = found[..., :2].swapaxes(-1, -2).reshape(5, 6, JOINTS, 6)
         np.testing.assert_array_equal(getattr(six, name), columns)
         np.testing.assert_allclose(getattr(vectors, name).reshape(-1, 3), expected.as_rotvec(), atol=2e-6)
+    # The bits of the engine, on any number of threads.
+    many = np.tile(plain.rotations.reshape(-1, 4), (4, 1))
+    clip = tumble.Clip(np.arange(len(many)), many)
+    at, exact = clip.times(0), vectors.rotations.reshape(-1, 3)
+    for threads in (1, 2):
+        found = tumble.Engine("cpu", threads=threads).rotation_vectors(clip, at=at, signs="as-authored")[0]
+        np.testing.assert_array_equal(found, np.tile(exact, (4, 1)))
+    first = library.sample(ids, times, order="wxyz", arrays=["world_rotations"]).world_rotations
+    np.testing.assert_array_equal(first, plain.world_rotations[..., [3, 0, 1, 2]])
     np.testing.assert_array_equal(matrices.positions, plain.positions)
     assert six.positions is None and matrices.rotations.ctypes.data % 64 == 0
     memory = six.rotations
@@ -601,6 +613,86 @@ def test_joints_that_are_left_out_may_be_broken(tmp_path):
     np.savez(tmp_path / "root.npz", poses=broken, trans=trans, gender="neutral", mocap_framerate=120.0)
     with pytest.raises(tumble.InputError, match="trans.*not finite"):
         tumble.MotionLibrary.load(tmp_path / "root.npz", tracks=tracks, offsets=np.ones((3, 3)))
+
+
+def with_a_broken_number(path):
+    """Puts NaN into a key of the last joint of a file of `wave`."""
+    if path.suffix == ".glb":
+        key = tumble.load(path).clip.keys(JOINTS - 1)[5].tobytes()
+        path.write_bytes(path.read_bytes().replace(key, np.full(4, np.nan, np.float32).tobytes()))
+    elif path.suffix == ".parquet":
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
+        table = pq.read_table(path)
+        index = table.schema.get_field_index("w")
+        last = [name == f"joint{JOINTS - 1}" for name in table["track"].to_pylist()]
+        numbers = np.where(last, np.nan, table["w"].to_numpy())
+        pq.write_table(table.set_column(index, table.schema.field(index), pa.array(numbers, table["w"].type)), path)
+    else:
+        # The last number of a row is one of the last joint.
+        separator = "," if path.suffix == ".csv" else " "
+        path.write_text(path.read_text().rstrip().rsplit(separator, 1)[0] + f"{separator}nan\n")
+
+
+@pytest.mark.parametrize("suffix", ["bvh", "glb", "csv", "parquet"])
+def test_joints_that_are_left_out_may_be_broken_in_files_of_every_kind(suffix, tmp_path):
+    good, broken = tmp_path / f"good.{suffix}", tmp_path / f"broken.{suffix}"
+    for path in (good, broken):
+        tumble.save(path, wave(12, 30), fps=30, method="slerp")
+    with_a_broken_number(broken)
+    tracks = [f"joint{joint}" for joint in (0, 1, 4, 3)]
+    options = {"skeleton": wave(3, 30)} if suffix in ("csv", "parquet") else {}
+    states = [tumble.MotionLibrary.load(path, tracks=tracks, **options).sample(0, [0.0, 0.2, 0.3]) for path in (good, broken)]
+    assert states[0] == states[1]
+    with pytest.raises(tumble.InputError, match="not finite|NaN"):
+        tumble.MotionLibrary.load(broken, **options)
+    with pytest.raises(tumble.InputError, match="not finite|NaN"):
+        tumble.MotionLibrary.load(broken, tracks=range(JOINTS), **options)
+
+
+def test_joints_that_collapse_leave_the_others_where_they_are(tmp_path):
+    """Wrists without elbows, and so on: the same poses in the world at every frame."""
+    path = tmp_path / "a.npz"
+    poses, trans = body(path, 49)
+    offsets = np.random.default_rng(9).normal(scale=0.3, size=(52, 3))
+    file = tumble.load(path, offsets=offsets).clip
+    tracks = ["left_knee", "pelvis", "left_wrist", "head"]
+    rows = [file.names.index(name) for name in tracks]
+    poses[7, 45] = np.nan  # a finger
+    np.savez(path, poses=poses.reshape(49, -1), trans=trans, gender="neutral", mocap_framerate=120.0)
+    for fps, times in [(30, np.arange(13) / 30), (None, np.arange(49) / 120)]:
+        some = tumble.MotionLibrary.load(path, fps=fps, tracks=tracks, offsets=offsets, collapse=True)
+        assert some.joint_names == tracks
+        found = some.sample(0, times)
+        expected = tumble.MotionLibrary([file]).sample(0, times)
+        np.testing.assert_allclose(found.positions, expected.positions[:, rows], atol=2e-6)
+        turned = [Rotation.from_quat(q.reshape(-1, 4)) for q in (found.world_rotations, expected.world_rotations[:, rows])]
+        assert (turned[0].inv() * turned[1]).magnitude().max() < 2e-6
+    clip = file.select(tracks, collapse=True)
+    assert (clip.names, clip.parents) == (tracks, [1, None, 1, 1]) and clip.rate == 120
+    positions = tumble.Engine("cpu").world(clip, at=file.times(0))[0]
+    np.testing.assert_allclose(positions, tumble.Engine("cpu").world(file, at=file.times(0))[0][rows], atol=2e-6)
+    # The knee hangs at the hip, which turns; the pelvis is as before.
+    assert clip.translations("left_knee") is not None
+    np.testing.assert_array_equal(clip.keys("pelvis"), file.keys("pelvis"))
+    assert file.select(["pelvis", "left_hip"], collapse=True) == file.select(["pelvis", "left_hip"])
+    # Without the pelvis, joints are in the world.
+    alone = file.select(["left_wrist", "head"], collapse=True)
+    assert alone.parents == [None, None]
+    np.testing.assert_allclose(alone.translations(1)[1], positions[3], atol=2e-6)
+    by_name = dict(zip(file.names, offsets.tolist()))
+    named = tumble.MotionLibrary.load(path, fps=30, tracks=tracks, offsets=by_name, collapse=True)
+    np.testing.assert_allclose(named.sample(0, 0.1).positions, expected.positions[12, rows], atol=2e-6)
+    unplaced = tumble.MotionLibrary.load(path, fps=30, tracks=tracks, collapse=True)
+    turns = unplaced.sample(0, 0.1, arrays=["world_rotations"]).world_rotations
+    np.testing.assert_allclose(np.abs((turns * expected.world_rotations[12, rows]).sum(-1)), 1, atol=1e-6)
+    for wrong, words in [
+        ({"offsets": offsets[:4], "tracks": tracks}, "4 offsets for 52 joints; with `collapse` give one for each joint of the file"),
+        ({}, "collapse: without `tracks` no joint is left out"),
+    ]:
+        with pytest.raises(tumble.InputError, match=words):
+            tumble.MotionLibrary.load(path, collapse=True, **wrong)
 
 
 def test_a_shard_is_the_same_however_it_is_made(tmp_path):

@@ -291,6 +291,38 @@ def test_a_mix_is_a_slerp(rng, engine):
         engine.mix(first, second[:4], 0.5)
 
 
+def test_weights_may_differ_between_frames(rng, engine):
+    """The bits are those of one weight after another."""
+    first, second, third = unit(rng, 5, 7), unit(rng, 5, 7), unit(rng, 7)
+    weights = np.linspace(0, 1, 7)
+    mixed = engine.mix(first, second, weights)
+    blended = engine.blend([first, second, third], [1.0, weights, weights[::-1] ** 2])
+    for frame, weight in enumerate(weights):
+        alone = [keys[..., frame, :] for keys in (first, second, third)]
+        assert np.array_equal(mixed[:, frame], engine.mix(*alone[:2], weight))
+        alone[2] = np.tile(alone[2], (5, 1))
+        one = engine.blend(alone, [1.0, weight, weights[6 - frame] ** 2])
+        assert np.array_equal(blended[:, frame], one)
+    tracks = engine.mix(first, second, weights[:5, None])
+    assert np.array_equal(tracks[2], engine.mix(first[2], second[2], weights[2]))
+    all_weights = rng.uniform(size=(2, 5, 7))
+    assert np.array_equal(engine.blend([first, second], all_weights), engine.blend([first, second], list(all_weights)))
+    # On threads, too.
+    many = np.tile(first, (600, 1, 1, 1))
+    assert np.array_equal(engine.mix(many, second, weights), np.broadcast_to(mixed, many.shape))
+    assert engine.mix(first[:, :1], second, 0.5).shape == (5, 7, 4)
+    for call, words in [
+        (lambda: engine.mix(first, second, [0.5, 1.5, 0, 0, 0, 0, 0]), "weight.*1.5"),
+        (lambda: engine.mix(first, second, [0.5, 0.5]), r"weight: its shape is \[2\]"),
+        (lambda: engine.blend([first, second], [weights, weights * np.nan]), "weight"),
+        (lambda: engine.blend([first, second], [weights]), "weights: there are 1 for 2 layers"),
+    ]:
+        with pytest.raises(tumble.InputError, match=words):
+            call()
+    with pytest.raises(TypeError, match="a number or an array for each layer"):
+        engine.blend([first, second], 0.5)
+
+
 def test_a_blend_is_a_sum_with_signs(rng, engine):
     layers, weights = unit(rng, 3, 5, 7), [1.0, 2.0, 0.5]
     found = engine.blend(list(layers), weights)

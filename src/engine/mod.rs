@@ -5,7 +5,7 @@ mod application_device;
 mod auto;
 pub(crate) mod clip;
 pub(crate) mod groups;
-mod matrices;
+mod representations;
 mod stream;
 
 use std::sync::Arc;

@@ -59,6 +59,14 @@ pub enum PoseError {
         /// The number of the layer's tracks.
         tracks: usize,
     },
+    /// There is not one weight for each rotation.
+    #[error("{weights} weights were given for {rotations} rotations; give one for each")]
+    RotationWeights {
+        /// The number of weights.
+        weights: usize,
+        /// The number of rotations of a layer.
+        rotations: usize,
+    },
     /// The skeleton's number of tracks differs from the poses'.
     #[error(
         "the skeleton has {skeleton_tracks} tracks, the poses have {tracks}; give one that has as many"
@@ -156,6 +164,14 @@ pub(crate) fn check_fraction(weight: f32) -> Result<(), PoseError> {
     match (0.0..=1.0).contains(&weight) {
         true => Ok(()),
         false => Err(PoseError::WeightOutOfRange { weight }),
+    }
+}
+
+/// Refuses weights that are not one for each rotation.
+pub(crate) fn check_weight_count(weights: usize, rotations: usize) -> Result<(), PoseError> {
+    match weights == rotations {
+        true => Ok(()),
+        false => Err(PoseError::RotationWeights { weights, rotations }),
     }
 }
 

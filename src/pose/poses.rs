@@ -3,6 +3,7 @@
 
 use glam::{Quat, Vec3};
 
+use crate::cpu::engine::poses::set_all;
 use crate::engine::Engine;
 use crate::error::Error;
 use crate::machine::error::EvaluateError;
@@ -10,10 +11,18 @@ use crate::machine::poses::{Pass, PassRunner};
 use crate::memory::zeroed;
 use crate::output::buffer::OutputBuffer;
 use crate::output::pose_error::{
-    PoseError, check_fraction, check_references, check_skeleton, check_weights,
+    PoseError, check_fraction, check_references, check_skeleton, check_weight_count, check_weights,
 };
 use crate::output::rotations::{Layout, Rotations};
 use crate::pose::skeleton::Skeleton;
+use crate::simd::dispatch::VectorWidth;
+use crate::twin::{pose_blend, pose_mix};
+
+/// The number of layers that are blended without an allocation.
+const FEW_LAYERS: usize = 8;
+
+/// The number of rotations that the host computes at once.
+const HOST_WINDOW: usize = 1 << 20;
 
 impl Engine {
     /// Blends layers: the normalised weighted sum of their rotations. Each layer's rotation has the sign that is
@@ -56,6 +65,64 @@ impl Engine {
         self.each_rotation(from, 1, |runner, start, output| {
             let [from, to] = [from, to].map(|layer| values(layer, start, output.len()));
             runner.run(&Pass::Mix { from, to, weight }, output)
+        })
+    }
+
+    /// As [`Engine::blend`], with a weight for each rotation of each layer, in the order of the results. The results have the
+    /// bits of `blend` with these weights; they are computed on the threads of the host, whatever the engine's device is.
+    ///
+    /// # Errors
+    /// As [`Engine::blend`]; also when a layer does not have one weight for each rotation.
+    pub fn blend_each(&self, layers: &[(&Rotations, &[f32])]) -> Result<Rotations, Error> {
+        let Some((&(first, _), others)) = layers.split_first() else {
+            return Err(PoseError::NoLayer.into());
+        };
+        for (index, &(layer, _)) in (1..).zip(others) {
+            same_shape(first, layer, index)?;
+        }
+        for (index, &(layer, weights)) in layers.iter().enumerate() {
+            check_weight_count(weights.len(), layer.as_arrays().len())?;
+            check_weights(weights).map_err(|error| of_layer(error, index))?;
+        }
+        let count = layers.len();
+        self.each_on_host(first, |index| {
+            // Few layers are blended without an allocation.
+            let mut poses = [[0.0; 4]; FEW_LAYERS];
+            let mut weights = [0.0; FEW_LAYERS];
+            if count > FEW_LAYERS {
+                let poses: Vec<[f32; 4]> = layers
+                    .iter()
+                    .map(|(layer, _)| layer.as_arrays()[index])
+                    .collect();
+                let weights: Vec<f32> = layers.iter().map(|(_, weights)| weights[index]).collect();
+                return pose_blend::pose(&poses, &weights, 1, 0);
+            }
+            for (at, (layer, of_layer)) in layers.iter().enumerate() {
+                (poses[at], weights[at]) = (layer.as_arrays()[index], of_layer[index]);
+            }
+            pose_blend::pose(&poses[..count], &weights[..count], 1, 0)
+        })
+    }
+
+    /// As [`Engine::mix`], with a weight for each rotation, in the order of the results. The results have the bits of `mix`
+    /// with these weights; they are computed on the threads of the host, whatever the engine's device is.
+    ///
+    /// # Errors
+    /// As [`Engine::mix`]; also when there is not one weight for each rotation.
+    pub fn mix_each(
+        &self,
+        from: &Rotations,
+        to: &Rotations,
+        weights: &[f32],
+    ) -> Result<Rotations, Error> {
+        same_shape(from, to, 1)?;
+        check_weight_count(weights.len(), from.as_arrays().len())?;
+        weights
+            .iter()
+            .try_for_each(|&weight| check_fraction(weight))?;
+        let [first, second] = [from, to].map(Rotations::as_arrays);
+        self.each_on_host(from, |index| {
+            pose_mix::pose(first[index], second[index], weights[index])
         })
     }
 
@@ -149,6 +216,24 @@ impl Engine {
         })
     }
 
+    /// Makes a result of the same shape as `like`, each rotation by its index, on the threads of the host.
+    fn each_on_host(
+        &self,
+        like: &Rotations,
+        pose: impl Fn(usize) -> [f32; 4] + Sync,
+    ) -> Result<Rotations, Error> {
+        let mut made = OutputBuffer::new(like.as_quats().len())?;
+        for (start, output) in (0..).step_by(HOST_WINDOW).zip(made.chunks_mut(HOST_WINDOW)) {
+            let output = bytemuck::cast_slice_mut(output);
+            let threads = self.machine.threads();
+            set_all(threads, VectorWidth::widest(), output, |index| {
+                pose(start + index)
+            })?;
+        }
+        let (tracks, samples, layout) = like.shape();
+        Ok(Rotations::new(Box::new(made), tracks, samples, layout))
+    }
+
     /// Makes a result of the same shape as `like`, some rotations at a time. `work` gets what runs its pass, the index
     /// of the first rotation, and the memory of the rotations. It reads `layers` values for each of them.
     fn each_rotation(
@@ -228,6 +313,14 @@ fn same_shape(first: &Rotations, other: &Rotations, layer: usize) -> Result<(), 
             shape,
             first,
         }),
+    }
+}
+
+/// An error of the weights of a layer, which names an index among them.
+fn of_layer(error: PoseError, layer: usize) -> PoseError {
+    match error {
+        PoseError::WeightNotFinite { weight, .. } => PoseError::WeightNotFinite { layer, weight },
+        other => other,
     }
 }
 

@@ -47,6 +47,7 @@ impl FrameKeys {
             positions: Blocks::new(moving.count()),
             remainders: None,
         };
+        let needed = needed_columns(hierarchy, options);
         let mut row = Vec::new();
         while let Some(line) = lines.next()? {
             let start = line.trim_start_matches([' ', '\t']);
@@ -58,7 +59,7 @@ impl FrameKeys {
                 return Err(lines.refuse(1, Code::BvhSecond, message));
             }
             if !start.is_empty() {
-                read_row(lines, &line, hierarchy.columns, &mut row)?;
+                read_row(lines, &line, &needed, &mut row)?;
                 if (rows.count as u64) < frames {
                     rows.push(hierarchy, &row);
                 } else {
@@ -335,16 +336,40 @@ fn read_field<R: BufRead>(
     Err(lines.refuse_end(code, message))
 }
 
+/// For each column of a row, whether it belongs to a joint that is needed.
+fn needed_columns(hierarchy: &Hierarchy, options: &ReadOptions) -> Vec<bool> {
+    let Some(selection) = &options.tracks else {
+        return vec![true; hierarchy.columns];
+    };
+    let joints = || hierarchy.joints.iter();
+    let parents: Vec<Option<usize>> = joints().map(|joint| joint.parent).collect();
+    let are_needed = selection.are_needed(joints().map(|joint| &*joint.name), &parents);
+    let mut needed = vec![false; hierarchy.columns];
+    for (joint, is_needed) in joints().zip(are_needed) {
+        for &(_, column) in joint.rotations.iter().chain(&joint.positions) {
+            needed[column] = is_needed;
+        }
+    }
+    needed
+}
+
+/// Reads the numbers of a row; `needed` has an entry for each.
 fn read_row<R: BufRead>(
     lines: &mut Lines<R>,
     line: &str,
-    columns: usize,
+    needed: &[bool],
     row: &mut Vec<f64>,
 ) -> Result<(), Diagnostic> {
+    let columns = needed.len();
     row.clear();
     for (column, token) in tokens(line) {
         let number = match number::parse(token) {
             Ok(number) if row.len() < columns => number,
+            // The joint will be left out.
+            Err((Code::NotFinite, _)) if needed.get(row.len()) == Some(&false) => {
+                row.push(0.0);
+                continue;
+            }
             Err((code, message)) if tokens(line).count() == columns => {
                 return Err(lines.refuse(column, code, message));
             }

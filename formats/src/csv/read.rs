@@ -57,7 +57,7 @@ pub fn read_csv(name: &str, bytes: Vec<u8>, options: &ReadOptions) -> Result<Loa
         name,
         bytes: &bytes[start..],
         time_power: options.time_unit.map_or(0, TimeUnit::power),
-        bridges_gaps: options.bridge_gaps,
+        allows_gaps: options.bridge_gaps || options.tracks.is_some(),
     };
     let mut reader = sheet.reader();
     let mut header = ByteRecord::new();
@@ -202,8 +202,8 @@ struct Sheet<'a> {
     bytes: &'a [u8],
     /// The power of ten of the unit of times, in seconds.
     time_power: i32,
-    /// Whether numbers that are missing or `NaN` become NaN.
-    bridges_gaps: bool,
+    /// Whether numbers that are missing or `NaN` become NaN: their keys, or their tracks, may be left out.
+    allows_gaps: bool,
 }
 
 impl<'a> Sheet<'a> {
@@ -390,7 +390,7 @@ impl TextCell<'_> {
     ) -> Result<(), Diagnostic> {
         // An empty cell is stored as a placeholder. The column is refused later because of it.
         if need == ColumnNeed::Number
-            && self.sheet.bridges_gaps
+            && self.sheet.allows_gaps
             && (self.text.is_empty() || number::is_nan(&as_text(self.text)))
             && let ColumnValues::Numbers(ColumnNumbers::F64(numbers)) = values
         {

@@ -93,7 +93,21 @@ pub(super) fn read(
     };
     let mut keys: Vec<ChannelKeys> = Vec::new();
     let mut borrowed = Vec::new();
+    let are_needed = options.tracks.as_ref().map(|selection| {
+        let names = tracks.nodes.iter().map(|&node| nodes.name(node));
+        let parent = |&node: &usize| Some(tracks.of_node(nodes.carrier(node).0?));
+        let parents: Vec<Option<usize>> = tracks.nodes.iter().map(parent).collect();
+        selection.are_needed(names, &parents)
+    });
     for moved in &moved {
+        let is_of_joint = moved.path != TargetPath::Weights;
+        if is_of_joint
+            && let Some(are_needed) = &are_needed
+            && !are_needed[tracks.of_node(moved.node)]
+        {
+            keys.push(ChannelKeys::at_rest());
+            continue;
+        }
         // Keys exist twice in memory until they are moved into the set.
         let count = times[&moved.sampler.input].len();
         borrowed.push(reader.borrow(count, moved.key_bytes(), &pointer)?);

@@ -289,6 +289,14 @@ fn half_turns(keys: &mut [Quat], warnings: &mut Warnings, location: &dyn Fn(usiz
 }
 
 impl ChannelKeys {
+    /// The keys of a channel of a joint that will be left out.
+    pub(super) fn at_rest() -> Self {
+        Self {
+            times: Vec::new(),
+            values: ChannelValues::Vectors(Vec::new(), Vec::new()),
+        }
+    }
+
     /// Adds a track of these rotations.
     ///
     /// # Errors

@@ -123,14 +123,26 @@ impl Motion {
 
     /// The key times of each channel that has keys, and of each scalar.
     pub(crate) fn key_lists(&self) -> impl Iterator<Item = &[f64]> {
-        let channels = [Channel::Translation, Channel::Scale];
         let scalars = self.scalar_keys().map(|keys| keys.times);
-        let tracks = (0..self.set.track_count()).flat_map(move |track| {
+        self.track_key_lists().chain(scalars)
+    }
+
+    /// The key times of each channel that has keys.
+    fn track_key_lists(&self) -> impl Iterator<Item = &[f64]> {
+        let channels = [Channel::Translation, Channel::Scale];
+        (0..self.set.track_count()).flat_map(move |track| {
             let vectors = channels.map(|channel| self.set.vector_keys(channel, track));
             let rotations = self.set.get(track).map(|track| track.times);
             let vectors = vectors.into_iter().flatten().map(|keys| keys.times);
             rotations.into_iter().chain(vectors)
-        });
-        tracks.chain(scalars)
+        })
+    }
+
+    /// The key times of all channels, each once, in order.
+    pub(crate) fn track_key_times(&self) -> Vec<f64> {
+        let mut times: Vec<f64> = self.track_key_lists().flatten().copied().collect();
+        times.sort_by(f64::total_cmp);
+        times.dedup();
+        times
     }
 }

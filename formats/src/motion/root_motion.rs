@@ -7,6 +7,7 @@ use crate::learning::heading::Ground;
 use crate::learning::root_motion::{HeadingSource, RootMotion};
 use crate::motion::origin::relative;
 use crate::motion::sample::{ChannelMethods, Samples};
+use crate::motion::similarity::Similarity;
 use crate::motion::{ChannelInterpolation, Channels, Joint, Motion, Transform, WrittenJoint};
 
 /// The treatment of the motion over the ground.
@@ -78,38 +79,6 @@ pub enum RootMotionError {
     /// The joint of the extracted motion could not be added.
     #[error(transparent)]
     Track(#[from] TrackError),
-}
-
-/// A transform without shear: first the scale, which is equal along all axes, then the rotation and the translation.
-#[derive(Clone, Copy)]
-struct Similarity {
-    scale: f64,
-    rotation: DQuat,
-    position: DVec3,
-}
-
-impl Similarity {
-    const IDENTITY: Self = Self {
-        scale: 1.0,
-        rotation: DQuat::IDENTITY,
-        position: DVec3::ZERO,
-    };
-
-    fn point(self, point: DVec3) -> DVec3 {
-        self.position + self.rotation * (self.scale * point)
-    }
-
-    fn point_back(self, point: DVec3) -> DVec3 {
-        self.rotation.conjugate() * (point - self.position) / self.scale
-    }
-
-    fn then(self, child: Self) -> Self {
-        Self {
-            scale: self.scale * child.scale,
-            rotation: self.rotation * child.rotation,
-            position: self.point(child.position),
-        }
-    }
 }
 
 /// Applies a rule for the motion over the ground to a sampled clip. By [`RootMotionRule::InPlace`] and by
@@ -192,17 +161,8 @@ pub fn with_root_motion(
 /// # Errors
 /// As [`Engine::evaluate`].
 pub fn track_samples(clip: &Motion, engine: &Engine) -> Result<Samples, Error> {
-    let mut times: Vec<f64> = Vec::new();
-    for track in 0..clip.set.track_count() {
-        times.extend(clip.set.track(track).times);
-        for channel in [Channel::Translation, Channel::Scale] {
-            let keys = clip.set.vector_keys(channel, track);
-            times.extend(keys.into_iter().flat_map(|keys| keys.times));
-        }
-    }
-    times.sort_by(f64::total_cmp);
-    times.dedup();
-    ChannelMethods::AUTHORED.sample(engine, clip, &SampleTimes::at(times))
+    let times = SampleTimes::at(clip.track_key_times());
+    ChannelMethods::AUTHORED.sample(engine, clip, &times)
 }
 
 /// Applies a rule for the motion over the ground to samples of a clip ([`track_samples`]), and returns a clip with the
@@ -296,27 +256,15 @@ fn parent_in_world(
         chain.push(track);
         next = parent(track);
     }
-    let at = |track: usize| frame * clip.set.track_count() + track;
     chain
         .iter()
         .rev()
         .try_fold(Similarity::IDENTITY, |above, &track| {
-            let scale = samples.scales.get(at(track)).copied();
-            let scale = scale
-                .unwrap_or_else(|| clip.rest(Channel::Scale, track))
-                .as_dvec3();
-            let is_even = (scale - DVec3::splat(scale.x)).abs().max_element() <= 1e-6 * scale.x;
-            if !is_even || scale.x <= 0.0 {
+            let local = Similarity::of_joint(clip, samples, frame, track);
+            local.map(|local| above.then(local)).ok_or_else(|| {
                 let name = clip.set.track_name(track);
-                return Err(RootMotionError::Scale { name });
-            }
-            let moved = samples.translations.get(at(track)).copied();
-            let moved = moved.unwrap_or_else(|| clip.rest(Channel::Translation, track));
-            Ok(above.then(Similarity {
-                scale: scale.x,
-                rotation: samples.rotations[at(track)].as_dquat().normalize(),
-                position: clip.origin(track) + moved.as_dvec3(),
-            }))
+                RootMotionError::Scale { name }
+            })
         })
 }
 

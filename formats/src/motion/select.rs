@@ -35,6 +35,42 @@ impl fmt::Display for TrackName {
     }
 }
 
+/// The tracks that will be selected from the clips of a file: readers do not read the keys of the others.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct TrackSelection {
+    /// The tracks.
+    pub tracks: Vec<TrackName>,
+    /// Whether their ancestors are needed, too.
+    pub with_ancestors: bool,
+}
+
+impl TrackSelection {
+    /// Whether each track of a file will be needed, by the names and the parents of all; `parents` may be empty. If the
+    /// selection has a track that the file does not have, all are needed: a name may be one that tracks without names get.
+    pub(crate) fn are_needed<'a>(
+        &self,
+        names: impl ExactSizeIterator<Item = &'a str>,
+        parents: &[Option<usize>],
+    ) -> Vec<bool> {
+        let names: Vec<&str> = names.collect();
+        let index_of = |one: &TrackName| (0..names.len()).find(|&it| one.is_of(it, names[it]));
+        let mut are_needed = vec![false; names.len()];
+        for track in &self.tracks {
+            let Some(index) = index_of(track) else {
+                return vec![true; names.len()];
+            };
+            let mut next = Some(index);
+            // Stop at a track that was visited before, which also ends circles.
+            while let Some(needed) = next.filter(|&it| are_needed.get(it) == Some(&false)) {
+                are_needed[needed] = true;
+                let parent = parents.get(needed).copied().flatten();
+                next = parent.filter(|_| self.with_ancestors);
+            }
+        }
+        are_needed
+    }
+}
+
 impl Motion {
     /// The clip of these tracks, in this order, and of all scalars. A joint whose parent is not among them becomes a root.
     ///

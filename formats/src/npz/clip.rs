@@ -12,7 +12,7 @@ use crate::motion::keys::{Duplicates, Origin, quiet_unit, select};
 use crate::motion::origin::relative;
 use crate::motion::signs::continue_signs;
 use crate::motion::{
-    Body, Joint, Motion, RecordedBodies, RecordedRobot, RecordedSample, TrackName, Transform,
+    Body, Joint, Motion, RecordedBodies, RecordedRobot, RecordedSample, Transform,
 };
 use crate::npz::archive::Archive;
 use crate::npz::array::{Array, AsStored, MIN_PARALLEL_KEYS, Make, Strides, TOGETHER};
@@ -172,19 +172,12 @@ pub(crate) fn read(
     Ok(motion)
 }
 
-/// For each track, whether its keys are read: those of tracks that will not be selected are not.
+/// For each track, whether its keys are read.
 fn read_tracks(plan: &ArchivePlan, options: &ReadOptions) -> Vec<bool> {
     let name = |track: usize| plan.names.get(track).map_or("", String::as_str);
-    let Some(selected) = &options.tracks else {
-        return vec![true; plan.tracks];
-    };
-    let is_selected = |track| selected.iter().any(|one| one.is_of(track, name(track)));
-    let found: Vec<bool> = (0..plan.tracks).map(is_selected).collect();
-    // A name that is not stored may be one that tracks without names get.
-    let is_stored = |one: &TrackName| (0..plan.tracks).any(|track| one.is_of(track, name(track)));
-    match selected.iter().all(is_stored) {
-        true => found,
-        false => vec![true; plan.tracks],
+    match &options.tracks {
+        Some(selection) => selection.are_needed((0..plan.tracks).map(name), &plan.parents),
+        None => vec![true; plan.tracks],
     }
 }
 

@@ -13,7 +13,7 @@ mod document;
 mod linear;
 mod mapped;
 pub(crate) mod plan;
-pub mod rotation_vector;
+pub(crate) mod rotation_vector;
 pub(crate) mod smpl;
 mod tumble_layout;
 mod world_bodies;

@@ -80,19 +80,6 @@ pub(crate) fn log_of(q: DQuat, before: Option<DVec3>) -> DVec3 {
     }
 }
 
-/// The rotation vector with an angle up to π; 0 if the rotation in f32 is too small to have an axis.
-#[must_use]
-pub fn shortest(rotation: Quat) -> DVec3 {
-    log(
-        if rotation.w < 0.0 {
-            -rotation
-        } else {
-            rotation
-        },
-        None,
-    )
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -41,7 +41,10 @@ pub(crate) fn clips(
         let message = format!("{} rows are more than 2^32; split the table", table.rows);
         return Err(table.refuse(Code::TableClaims, message));
     }
-    table.check_nulls(options.bridge_gaps)?;
+    // The keys of tracks that will be left out are not read.
+    table.check_nulls(|column| {
+        options.bridge_gaps || options.tracks.is_some() && plan.is_of_track(column)
+    })?;
     let mut warnings = Warnings::new(&table.file);
     if let Some(columns) = plan.left_out(table) {
         warnings.warn(Code::ColumnsLeftOut, || {
@@ -149,6 +152,15 @@ impl TableClip<'_> {
     #[inline]
     pub(crate) fn row(&self, position: usize) -> usize {
         self.rows.map_or(position, |rows| rows[position] as usize)
+    }
+
+    /// Whether each track will be needed. Parents are not known yet, so that all are if ancestors are needed.
+    pub(crate) fn are_needed(&self, shared: &SharedRows<'_>) -> Vec<bool> {
+        let names = shared.tracks.iter().map(|track| &*track.name);
+        match &self.options.tracks {
+            Some(selection) if !selection.with_ancestors => selection.are_needed(names, &[]),
+            _ => vec![true; shared.tracks.len()],
+        }
     }
 
     fn read(

@@ -129,8 +129,11 @@ impl Table {
         refusal
     }
 
-    /// Refuses the first null of any column; with `bridges_gaps` not those of numbers, which are NaN then.
-    pub(crate) fn check_nulls(&self, bridges_gaps: bool) -> Result<(), Diagnostic> {
+    /// Refuses the first null of any column, except those of the columns of numbers that may have gaps. They are NaN.
+    pub(crate) fn check_nulls(
+        &self,
+        may_have_gaps: impl Fn(usize) -> bool,
+    ) -> Result<(), Diagnostic> {
         let is_float = |column: &Column| {
             matches!(
                 column.values,
@@ -138,7 +141,10 @@ impl Table {
             )
         };
         let checked = self.columns.iter().enumerate();
-        for (index, column) in checked.filter(|(_, column)| !(bridges_gaps && is_float(column))) {
+        for (index, column) in checked {
+            if is_float(column) && may_have_gaps(index) {
+                continue;
+            }
             if let Some(row) = column.null {
                 let remedy = match is_float(column) {
                     true => "fill it in, remove the row, or leave the key out with --bridge-gaps",

@@ -151,6 +151,15 @@ pub(crate) struct Parts {
     pub(crate) scale: Option<[CellSource; 3]>,
 }
 
+impl Parts {
+    /// All cells of a key.
+    pub(crate) fn cells(&self) -> impl Iterator<Item = CellSource> {
+        let vectors = [&self.translation, &self.scale].into_iter().flatten();
+        let rotation = self.rotation.all().iter();
+        rotation.chain(vectors.flatten()).copied()
+    }
+}
+
 /// The columns of the numbers of rotations.
 #[derive(Debug)]
 pub(crate) enum RotationCells {
@@ -401,6 +410,15 @@ struct VectorCells {
 }
 
 impl TablePlan {
+    /// Whether a column has numbers of the keys of tracks.
+    pub(crate) fn is_of_track(&self, column: usize) -> bool {
+        let has = |parts: &Parts| parts.cells().any(|cell| cell.column == column);
+        match &self.rows {
+            RowLayout::Keys { parts, .. } => has(parts),
+            RowLayout::Times { tracks, .. } => tracks.iter().any(|(_, parts)| has(parts)),
+        }
+    }
+
     /// The names of data that is not read: columns, and parts of lists.
     pub(crate) fn left_out(&self, table: &Table) -> Option<String> {
         let mut all: Vec<String> = self

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import glob as _glob
 import numbers
 import operator
@@ -28,6 +29,7 @@ from tumble._tumble import (
     Motions,
     load,
     load_all,
+    put_w_first,
     represent,
     scalar_motions,
     shaped,
@@ -346,6 +348,7 @@ class MotionLibrary(Generic[_A]):
         packed: bool = ...,
         fps: float | str | Fraction | None = ...,
         tracks: Sequence[str] | Sequence[int] | None = ...,
+        collapse: bool = ...,
         progress: _Progress | None = ...,
         shard: tuple[int, int] | None = ...,
         device: Literal["cpu"] | None = ...,
@@ -365,6 +368,7 @@ class MotionLibrary(Generic[_A]):
         packed: bool = ...,
         fps: float | str | Fraction | None = ...,
         tracks: Sequence[str] | Sequence[int] | None = ...,
+        collapse: bool = ...,
         progress: _Progress | None = ...,
         shard: tuple[int, int] | None = ...,
         device: _Device,
@@ -383,6 +387,7 @@ class MotionLibrary(Generic[_A]):
         packed: bool = False,
         fps: float | str | Fraction | None = None,
         tracks: Sequence[str] | Sequence[int] | None = None,
+        collapse: bool = False,
         progress: _Progress | None = None,
         shard: tuple[int, int] | None = None,
         device: _Device | None = None,
@@ -392,16 +397,17 @@ class MotionLibrary(Generic[_A]):
         of every file belongs to the library, in the order of the file names.
 
         `fps`: clips are sampled at this rate by `method`; an incomplete frame at the end is left out. `tracks`: the names
-        or the indices of joints, in the order of the results; their parents must be included, too. The keys of other joints
-        in NPZ files and pickles are not read. `shard`: read only the files for one of several processes, as
+        or the indices of joints, in the order of the results; their parents must be included, too, unless `collapse`, which
+        adds the motion of joints that are left out to their children, as `Clip.select`, at the frames of `fps`. Numbers of
+        other joints that are not finite are no errors. `shard`: read only the files for one of several processes, as
         (rank, processes): the library is then `load(…).shard(rank, processes)`. For the order of the joints, the first file of
         all is read, too, unless `skeleton` has it.
 
         `options`: the keywords of `tumble.load`, for each file, such as `source_fps`, `up`, `scale`, `offsets`,
         `body_model` and `map`. With `tracks`, `offsets` has a row for each selected joint, in the order of `tracks`, or a
         row for each joint of the file, in the order of the file; the number of rows tells which. Or `offsets` is a dict by
-        names. `on_error`: "refuse" ends at the first file that cannot be read; "skip" leaves out such files, and clips
-        that do not fit the skeleton, and lists them in `skipped`. Files of AMASS without a motion
+        names. With `collapse`, it has all joints of the file. `on_error`: "refuse" ends at the first file that cannot be
+        read; "skip" leaves out such files, and clips that do not fit the skeleton, and lists them in `skipped`. Files of AMASS without a motion
         (`shape.npz`, `*_stagei.npz`) are left out, too. `progress`: a bar such as `tqdm.tqdm` or an instance of it, or a
         function, which is called with the number of files read so far and of all. `packed`, `device`: as of the class.
 
@@ -434,6 +440,7 @@ class MotionLibrary(Generic[_A]):
                 progress=step,
                 fps=fps,
                 tracks=tracks,
+                collapse=collapse,
                 method=method,
             )
             at_fault = [(os.fspath(path), code, message) for path, code, message in faults]
@@ -463,7 +470,7 @@ class MotionLibrary(Generic[_A]):
                 if index % processes != rank and not before:
                     before = read([index])[0]
         if skeleton is not None and not isinstance(skeleton, tuple):
-            skeleton = shaped(_clip_of(skeleton), tracks=tracks)
+            skeleton = shaped(_clip_of(skeleton), tracks=tracks, collapse=collapse, method=method)
         every = before + clips
         made: MotionLibrary[Any] = cls(
             [clip for _, clip in every],
@@ -475,6 +482,8 @@ class MotionLibrary(Generic[_A]):
             device=device,
         )
         file_of = np.array([index for index, _ in every], np.int64)
+        del before, clips, every
+        _return_memory()
         made._shard_indices = file_of[made._shard_indices]
         made.skipped = [one for _, one in skipped] + made.skipped
         made._skipped_indices = [index for index, _ in skipped] + [int(file_of[index]) for index in made._skipped_indices]
@@ -744,7 +753,7 @@ class MotionLibrary(Generic[_A]):
         if order == "wxyz":
             for array in (out.rotations, out.world_rotations):
                 if array is not None:
-                    array[...] = np.roll(array, 1, axis=-1)
+                    put_w_first(array)
         self._fill_scalars(ids, moments, finite, filled)
         return out
 
@@ -1150,7 +1159,9 @@ class MotionLibrary(Generic[_A]):
 
     def __reduce__(self) -> tuple[Any, ...]:
         if self._file is not None:
-            return _opened, (self._file, self._engine, self._only, self._device, self._shard_indices)
+            # The file has the indices of all clips.
+            shard_indices = None if self._only is None else self._shard_indices
+            return _opened, (self._file, self._engine, self._only, self._device, shard_indices)
         return MotionLibrary._of_arrays, (self._arrays(), self._engine, None, self._device)
 
     def __len__(self) -> int:
@@ -1192,6 +1203,16 @@ class MotionLibrary(Generic[_A]):
         seconds = float(self.lengths.sum())
         device = "" if self._device is None else f", on {self.device}"
         return f"MotionLibrary({len(self)} clips, {self.joints} joints, {seconds:.6g} s{device})"
+
+
+def _return_memory() -> None:
+    """Returns freed memory to the system. The files of a library take several times its memory while they are read, and the
+    allocator of glibc would keep it."""
+    try:
+        trim = ctypes.CDLL(None).malloc_trim
+    except (AttributeError, OSError, TypeError):
+        return  # another allocator
+    trim(0)
 
 
 def _skips(on_error: str) -> bool:

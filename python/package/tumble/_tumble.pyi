@@ -65,6 +65,7 @@ __all__ = [
     "panic",
     "path_errors",
     "positions_of_humanml3d",
+    "put_w_first",
     "reduce",
     "referred_files",
     "represent",
@@ -351,7 +352,7 @@ class Clip:
         continuity: float | None = None,
         bias: float | None = None,
     ) -> DeviceArray: ...
-    def select(self, tracks: Sequence[str] | Sequence[int]) -> Clip:
+    def select(self, tracks: Sequence[str] | Sequence[int], *, collapse: bool = False) -> Clip:
         """The clip with some of its joints, `tracks`, by their names or indices, in this order. Their parents must be
         included, too."""
     def cut(self, start: float | None = None, end: float | None = None) -> Clip:
@@ -969,7 +970,7 @@ class Engine:
     def blend(
         self,
         layers: Sequence[_Keys] | NDArray[Any],
-        weights: ArrayLike | None = None,
+        weights: ArrayLike | Sequence[ArrayLike] | None = None,
         *,
         order: _Order = "xyzw",
         out: _Single | None = None,
@@ -981,7 +982,7 @@ class Engine:
         self,
         first: _Keys,
         second: _Keys,
-        weight: float,
+        weight: ArrayLike,
         *,
         order: _Order = "xyzw",
         out: _Single | None = None,
@@ -1362,6 +1363,7 @@ def load_all(
     progress: Callable[[int, int], object] | None = None,
     fps: float | str | Fraction | None = None,
     tracks: Sequence[str] | Sequence[int] | None = None,
+    collapse: bool = False,
     method: str = "slerp",
 ) -> tuple[list[File], list[tuple[str, str | None, str]]]: ...
 def shaped(
@@ -1369,11 +1371,13 @@ def shaped(
     *,
     fps: float | str | Fraction | None = None,
     tracks: Sequence[str] | Sequence[int] | None = None,
+    collapse: bool = False,
     method: str = "slerp",
 ) -> Clip: ...
 def scalar_motions(
     clips: Sequence[Clip], method: str, ticks_per_second: int, *, contacts: bool
 ) -> tuple[Motions | None, list[str], list[int], str | None]: ...
+def put_w_first(quaternions: _Single) -> None: ...
 def represent(engine: Engine, rotations: _Single, kind: str, out: _Single) -> None: ...
 def clip_of_state(state: dict[str, Any]) -> Clip: ...
 def file_of_state(

@@ -393,15 +393,23 @@ impl Clip {
     }
 
     /// The clip with some of its joints, `tracks`, by their names or indices, in this order. Their parents must be
-    /// included, too.
+    /// included, too, unless `collapse`: then the motion of a joint that is left out is not lost. Its child becomes a child of
+    /// the nearest ancestor that is included, or a root, with the product of the rotations and translations in between, so that
+    /// included joints have the same poses in the world at their keys. Such a joint has keys of translations if a joint above it
+    /// turns, at the key times of all joints in the product.
     ///
     /// >>> import tumble
-    /// >>> keys = [[[0, 0, 0, 1]], [[1, 0, 0, 0]]]
-    /// >>> clip = tumble.Clip([0.0], keys, layout="track", names=["hip", "knee"], parents=[None, 0])
-    /// >>> clip.select(["hip"]).names
-    /// ['hip']
-    fn select(slf: &Bound<'_, Self>, tracks: &Bound<'_, PyAny>) -> PyResult<Self> {
-        let found = shaped(slf, None, Some(tracks), "slerp")?;
+    /// >>> keys = [[[0, 0, 0, 1]], [[1, 0, 0, 0]], [[0, 0, 1, 0]]]
+    /// >>> clip = tumble.Clip([0.0], keys, layout="track", names=["hip", "knee", "foot"], parents=[None, 0, 1],
+    /// ...                    offsets=[[0, 0, 0], [0, 1, 0], [0, 1, 0]])
+    /// >>> clip.select(["hip", "knee"]).names
+    /// ['hip', 'knee']
+    /// >>> collapsed = clip.select(["hip", "foot"], collapse=True)
+    /// >>> collapsed.parents, collapsed.keys("foot"), collapsed.offsets[1]
+    /// ([None, 0], array([[ 0., -1.,  0.,  0.]], dtype=float32), array([0., 0., 0.], dtype=float32))
+    #[pyo3(signature = (tracks, *, collapse=false))]
+    fn select(slf: &Bound<'_, Self>, tracks: &Bound<'_, PyAny>, collapse: bool) -> PyResult<Self> {
+        let found = shaped(slf, None, Some(tracks), collapse, "authored")?;
         Ok(found.without_document())
     }
 

@@ -564,8 +564,8 @@ impl Engine {
     /// the sign that is nearer to the first one's. Weights need not add up to 1. Arrays have no names, so tracks are
     /// combined by index: bring those of clips into one order by `Clip.names` first.
     ///
-    /// `layers`: a list of arrays (…, 4) of one shape, which is that of the result; `weights`: a number for each,
-    /// by default 1.
+    /// `layers`: a list of arrays (…, 4), whose shapes broadcast to that of the result; `weights`: for each a number, by default
+    /// 1, or an array of numbers, (…), such as one for each frame.
     ///
     /// >>> import tumble
     /// >>> tumble.Engine("cpu").blend([[[0, 0, 0, 1]], [[0, 0, 1, 0]]], [3, 3]).round(4)
@@ -583,17 +583,20 @@ impl Engine {
     }
 
     /// Slerp, the shorter way, from every rotation of the first array (…, 4) to that of the second, by a `weight`
-    /// from 0 to 1. Tracks are combined by index, as in `blend`.
+    /// from 0 to 1, or an array of weights, (…), such as one for each frame. The shapes broadcast. Tracks are combined by
+    /// index, as in `blend`.
     ///
     /// >>> import tumble
     /// >>> tumble.Engine("cpu").mix([0, 0, 0, 1], [0, 0, 1, 0], 0.5).round(4)
     /// array([0.    , 0.    , 0.7071, 0.7071], dtype=float32)
+    /// >>> tumble.Engine("cpu").mix([0, 0, 0, 1], [0, 0, 1, 0], [0.0, 0.5]).shape
+    /// (2, 4)
     #[pyo3(signature = (first, second, weight, *, order="xyzw", out=None))]
     fn mix<'py>(
         &self,
         first: &Bound<'py, PyAny>,
         second: &Bound<'py, PyAny>,
-        weight: f32,
+        weight: &Bound<'py, PyAny>,
         order: &str,
         out: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyAny>> {

@@ -4,7 +4,7 @@
 pub(crate) mod clip;
 pub(crate) mod from_keys;
 mod machine;
-mod poses;
+pub(crate) mod poses;
 pub(crate) mod sparse_samples;
 
 use rayon::prelude::*;

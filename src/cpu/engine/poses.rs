@@ -3,13 +3,14 @@
 use rayon::prelude::*;
 
 use crate::cpu::engine::CpuEngine;
+use crate::machine::Machine;
 use crate::machine::error::EvaluateError;
 use crate::machine::poses::{Pass, PassRunner, SampleRows};
 use crate::output::rotations::Layout;
 use crate::simd::dispatch::{InLanes, VectorWidth, in_lanes_of};
 use crate::simd::lanes::Lanes;
 use crate::smooth::rows::{SmoothingBlock, SmoothingPass};
-use crate::threads::OutOfThreadsError;
+use crate::threads::{OutOfThreadsError, Threads};
 use crate::twin::{pose_add, pose_blend, pose_mix, pose_world};
 
 /// The number of values of one pass: enough for all threads, and gathered in 16 MiB.
@@ -32,11 +33,11 @@ impl PassRunner for CpuEngine {
         Ok(match *pass {
             Pass::Blend { layers, weights } => {
                 let blended = |index| pose_blend::pose(layers, weights, count, index);
-                self.set_all(output, blended)
+                set_all(self.threads(), self.width, output, blended)
             }
             Pass::Mix { from, to, weight } => {
                 let mixed = |index: usize| pose_mix::pose(from[index], to[index], weight);
-                self.set_all(output, mixed)
+                set_all(self.threads(), self.width, output, mixed)
             }
             Pass::Add {
                 base,
@@ -45,7 +46,7 @@ impl PassRunner for CpuEngine {
             } => {
                 let [weight, ..] = references[count];
                 let added = |i: usize| pose_add::pose(base[i], layer[i], references[i], weight);
-                self.set_all(output, added)
+                set_all(self.threads(), self.width, output, added)
             }
             Pass::World { local, links } => self.on_threads(|| {
                 let frames = output.par_chunks_mut(2 * links.len());
@@ -113,26 +114,24 @@ impl<F: Fn(usize) -> [f32; 4]> InLanes for PoseTask<'_, F> {
     }
 }
 
-impl CpuEngine {
-    /// Sets all values.
-    fn set_all(
-        &self,
-        output: &mut [[f32; 4]],
-        pose: impl Fn(usize) -> [f32; 4] + Sync,
-    ) -> Result<(), OutOfThreadsError> {
-        let width: VectorWidth = self.width;
-        let task = |(task, output): (usize, &mut [[f32; 4]])| {
-            let mut task = PoseTask {
-                first: task * TASK,
-                output,
-                pose: &pose,
-            };
-            in_lanes_of(width, &mut task);
+/// Sets all values, on threads.
+pub(crate) fn set_all(
+    threads: &Threads,
+    width: VectorWidth,
+    output: &mut [[f32; 4]],
+    pose: impl Fn(usize) -> [f32; 4] + Sync,
+) -> Result<(), OutOfThreadsError> {
+    let task = |(task, output): (usize, &mut [[f32; 4]])| {
+        let mut task = PoseTask {
+            first: task * TASK,
+            output,
+            pose: &pose,
         };
-        if output.len() <= TASK {
-            task((0, output));
-            return Ok(());
-        }
-        self.on_threads(|| output.par_chunks_mut(TASK).enumerate().for_each(task))
+        in_lanes_of(width, &mut task);
+    };
+    if output.len() <= TASK {
+        task((0, output));
+        return Ok(());
     }
+    threads.run(|| output.par_chunks_mut(TASK).enumerate().for_each(task))
 }

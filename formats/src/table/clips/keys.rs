@@ -25,6 +25,16 @@ pub(crate) struct RowKeys {
 }
 
 impl RowKeys {
+    /// The keys of a track that will be left out.
+    fn at_rest(count: usize) -> Self {
+        Self {
+            rotations: vec![Quat::IDENTITY; count],
+            origin: DVec3::ZERO,
+            translations: Vec::new(),
+            scales: Vec::new(),
+        }
+    }
+
     /// Keeps the keys with these indices, in this order.
     pub(crate) fn select(&mut self, kept: &[usize]) {
         select(&mut self.rotations, Some(kept));
@@ -90,23 +100,37 @@ impl TableClip<'_> {
         shared: &SharedRows<'_>,
         warnings: &mut Warnings,
     ) -> Result<Vec<RowKeys>, Diagnostic> {
-        let quiet_keys =
-            |track: &TableTrack<'_>| self.quiet_keys(track.parts, shared.positions(track));
+        let are_needed = self.are_needed(shared);
+        let quiet_keys = |(track, &is_needed): (&TableTrack<'_>, &bool)| {
+            let positions = shared.positions(track);
+            match is_needed {
+                true => self.quiet_keys(track.parts, positions),
+                false => Some(RowKeys::at_rest(positions.len())),
+            }
+        };
         let rows = shared
             .tracks
             .first()
             .map_or(0, |track| shared.positions(track).len());
         let at_least = MIN_PARALLEL_ROWS.div_ceil(rows.max(1));
-        let alone = || shared.tracks.iter().map(quiet_keys).collect();
+        let alone = || {
+            shared
+                .tracks
+                .iter()
+                .zip(&are_needed)
+                .map(quiet_keys)
+                .collect()
+        };
         let quiet: Vec<Option<RowKeys>> = match shared.tracks.len() <= at_least {
             true => alone(),
             false => tumble::on_threads(|| {
-                let tracks = shared.tracks.par_iter().with_min_len(at_least);
-                tracks.map(quiet_keys).collect()
+                let tracks = shared.tracks.par_iter().zip(&are_needed);
+                tracks.with_min_len(at_least).map(quiet_keys).collect()
             })
             // If the system refuses to start threads, this thread does all the work.
             .unwrap_or_else(|_| alone()),
         };
+        let left_out = self.left_out(shared, &are_needed);
         // Tracks with the same columns are read together, so that warnings are in the order of the rows.
         let mut known: Option<(&Parts, AllKeys)> = None;
         let keys = shared.tracks.iter().zip(quiet).map(|(track, quiet)| {
@@ -115,7 +139,7 @@ impl TableClip<'_> {
             }
             let all = match known.take() {
                 Some((parts, all)) if std::ptr::eq(parts, track.parts) => all,
-                _ => self.all_keys(track.parts, warnings)?,
+                _ => self.all_keys(track.parts, &left_out, warnings)?,
             };
             let keys = all.at(shared.positions(track));
             known = Some((track.parts, all));
@@ -220,8 +244,28 @@ impl TableClip<'_> {
         }
     }
 
-    /// The keys of all rows, one after another.
-    fn all_keys(&self, parts: &Parts, warnings: &mut Warnings) -> Result<AllKeys, Diagnostic> {
+    /// For each row, whether it is only of tracks that will be left out.
+    fn left_out(&self, shared: &SharedRows<'_>, are_needed: &[bool]) -> Vec<bool> {
+        if are_needed.iter().all(|&is_needed| is_needed) {
+            return vec![false; self.len()];
+        }
+        let mut left_out = vec![true; self.len()];
+        let tracks = shared.tracks.iter().zip(are_needed);
+        for (track, _) in tracks.filter(|(_, is_needed)| **is_needed) {
+            for &position in shared.positions(track) {
+                left_out[position as usize] = false;
+            }
+        }
+        left_out
+    }
+
+    /// The keys of all rows, one after another; those that are left out are at rest.
+    fn all_keys(
+        &self,
+        parts: &Parts,
+        left_out: &[bool],
+        warnings: &mut Warnings,
+    ) -> Result<AllKeys, Diagnostic> {
         let column = parts.rotation.all()[0].column;
         let location = |key: usize| self.table.location(column, self.row(key));
         let origin = Origin {
@@ -232,14 +276,22 @@ impl TableClip<'_> {
         let quats: Vec<DQuat> = match &parts.rotation {
             RotationCells::Quaternion(cells) => {
                 let [x, y, z, w] = self.columns(cells)?;
-                let rows = (0..self.len()).map(|position| self.row(position));
-                rows.map(|row| DQuat::from_xyzw(x.at(row), y.at(row), z.at(row), w.at(row)))
-                    .collect()
+                let rotation = |position: usize| {
+                    let row = self.row(position);
+                    match left_out[position] {
+                        true => DQuat::IDENTITY,
+                        false => DQuat::from_xyzw(x.at(row), y.at(row), z.at(row), w.at(row)),
+                    }
+                };
+                (0..self.len()).map(rotation).collect()
             }
             RotationCells::Other(form, cells) => {
                 let columns = cells.iter().map(|&cell| self.reader(cell));
                 let columns: Vec<CellReader<'_>> = columns.collect::<Result<_, _>>()?;
-                let rotation = |position| {
+                let rotation = |position: usize| {
+                    if left_out[position] {
+                        return Ok(DQuat::IDENTITY);
+                    }
                     let row = self.row(position);
                     let numbers: Vec<f64> = columns.iter().map(|column| column.at(row)).collect();
                     // Rows with NaN are removed later.
@@ -266,17 +318,24 @@ impl TableClip<'_> {
         Ok(AllKeys {
             continues_signs: matches!(parts.rotation, RotationCells::Other(..)),
             rotations: origin.unit(quats, warnings)?,
-            translations: self.all_vectors(parts.translation.as_ref())?,
-            scales: self.all_vectors(parts.scale.as_ref())?,
+            translations: self.all_vectors(parts.translation.as_ref(), left_out)?,
+            scales: self.all_vectors(parts.scale.as_ref(), left_out)?,
         })
     }
 
-    fn all_vectors(&self, cells: Option<&[CellSource; 3]>) -> Result<Vec<DVec3>, Diagnostic> {
+    fn all_vectors(
+        &self,
+        cells: Option<&[CellSource; 3]>,
+        left_out: &[bool],
+    ) -> Result<Vec<DVec3>, Diagnostic> {
         let Some(cells) = cells else {
             return Ok(Vec::new());
         };
         let columns = self.columns(cells)?;
-        let vector = |position| {
+        let vector = |position: usize| {
+            if left_out[position] {
+                return Ok(DVec3::ZERO);
+            }
             let row = self.row(position);
             let numbers = [0, 1, 2].map(|i: usize| columns[i].at(row));
             let is_bad = |number: f64| {
@@ -297,10 +356,7 @@ impl TableClip<'_> {
     ///
     /// [`ReadOptions::bridge_gaps`]: crate::format::ReadOptions::bridge_gaps
     pub(crate) fn gaps(&self, parts: &Parts) -> Result<Option<Vec<bool>>, Diagnostic> {
-        let vectors = [&parts.translation, &parts.scale];
-        let cells = parts.rotation.all().iter();
-        let cells = cells.chain(vectors.into_iter().flatten().flatten());
-        let columns = cells.map(|&cell| self.reader(cell));
+        let columns = parts.cells().map(|cell| self.reader(cell));
         let columns: Vec<CellReader<'_>> = columns.collect::<Result<_, _>>()?;
         let is_gap = |position: usize| {
             let row = self.row(position);
