@@ -219,7 +219,8 @@ pub mod vulkan {
     //! * **An application's device** (feature `vulkan`): [`Engine::from_vulkan`](crate::Engine::from_vulkan) takes
     //!   `VulkanHandles` and a `VulkanQueue`; a `QueueLock` is a lock for a queue. Results are written to a
     //!   `VulkanBuffer`: at once by `Request::to_buffer`, or recorded into the application's commands by a
-    //!   `ClipTarget` or a `CrowdTarget`. A `PosePass` blends, mixes or adds poses in such buffers, or evaluates a
+    //!   `ClipTarget`, a `TimedTarget` or a `CrowdTarget`. A `CrowdStage` continues a crowd's matrices after the application has changed
+    //!   them. A `PosePass` blends, mixes or adds poses in such buffers, or evaluates a
     //!   skeleton; a `PassTarget` records it.
     //! * **Memory for other interfaces on the same card**, such as CUDA: an `ExportedResult`.
     //!
@@ -247,6 +248,7 @@ pub mod vulkan {
         gpu::handles::{QueueLock, VulkanBuffer, VulkanHandles, VulkanQueue},
         gpu::passes::PassTarget,
         gpu::recorded::{CommandScopes, CommandUsers},
+        gpu::timed_clip::TimedTarget,
         pose::pass::{PassRequest, PosePass},
     };
 
@@ -270,6 +272,9 @@ pub use glam;
 mod guide {
     #[doc = include_str!("../README.md")]
     struct Readme;
+    #[cfg(feature = "vulkan")]
+    #[doc = include_str!("../docs/crowd.md")]
+    struct Crowds;
     #[doc = include_str!("../docs/library.md")]
     struct Library;
     #[doc = include_str!("../docs/your-tests.md")]

@@ -49,6 +49,8 @@ mod textbook;
 mod threads;
 #[cfg(feature = "vulkan")]
 mod tidy;
+#[cfg(feature = "vulkan")]
+mod timed;
 mod times;
 mod transforms;
 #[cfg(feature = "vulkan")]

@@ -34,6 +34,8 @@ fn values_of_options_are_found_by_their_names() {
     assert_named(&Axes::ALL);
     assert_named(&Channel::ALL);
     assert_named(&ComponentType::ALL);
+    #[cfg(feature = "vulkan")]
+    assert_named(&tumble::crowd::CrowdStage::ALL);
     assert_named(&CrowdValues::ALL);
     assert_named(&DifferenceKind::ALL);
     assert_named(&Ends::ALL);

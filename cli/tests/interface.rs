@@ -114,6 +114,7 @@ const NOT_CLONED: &[(&str, &str)] = &[
     ("reference::ReferenceCurve", "it is made of functions"),
     ("vulkan::ClipTarget", "it owns objects of Vulkan"),
     ("vulkan::CrowdTarget", "it owns objects of Vulkan"),
+    ("vulkan::TimedTarget", "it owns objects of Vulkan"),
     ("vulkan::PassTarget", "it owns objects of Vulkan"),
 ];
 

@@ -157,6 +157,18 @@ impl Instances {
         }
     }
 
+    /// A frame that needs no changes, because matrices in a buffer are continued. The changes wait for the next
+    /// evaluation.
+    #[cfg(feature = "vulkan")]
+    pub(crate) fn frame_of_stage(&self, layers: usize) -> CrowdFrame<'_> {
+        CrowdFrame {
+            clock: self.clock,
+            changes: EntryChanges::None,
+            instances: self.visible_count(layers) as u32,
+            visible: VisibleInstances::All,
+        }
+    }
+
     /// The first entry that changed, the end of the range of changes, and the number of changes.
     fn changed_range(&self) -> Option<(usize, usize, usize)> {
         let changed = |word: &u64| *word != 0;

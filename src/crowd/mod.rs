@@ -13,6 +13,7 @@
 //! * [`CrowdFade`]: a layer's weight as a function of the clock.
 //! * [`ClipEvent`]: a named moment of a clip; [`Crowd::passed_events`] lists those that instances pass.
 //! * [`CrowdOutput`]: which values an evaluation stores for each joint ([`CrowdValues`]), in 32 or 16 bits.
+//!   With the feature `vulkan`, a `CrowdStage` continues matrices in a buffer that the application has changed.
 //! * [`MotionTables`] and [`MotionStates`]: clips without instances, for the training of models of motion.
 //!   [`MotionBuilder`] collects them. With the feature `vulkan`, a `DeviceMotions` has them on a device.
 //!
@@ -70,6 +71,8 @@ pub use crate::crowd::states::{FrameStep, MotionStates, MotionTables, MotionWord
 pub use crate::crowd_error::CrowdError;
 #[cfg(feature = "vulkan")]
 pub use crate::gpu::motion::MappedStates;
+#[cfg(feature = "vulkan")]
+pub use crate::output::crowd::CrowdStage;
 pub use crate::output::crowd::{CrowdOutput, CrowdValues};
 #[cfg(feature = "vulkan")]
 pub use crate::output::states::StateArray;

@@ -146,6 +146,61 @@ impl MachineClip for VulkanClip {
     }
 }
 
+/// A range of an application's buffer for results of one size.
+pub(super) struct ResultRange {
+    pub(super) encoding: Encoding,
+    buffer: VulkanBuffer,
+    /// The offset at which the buffer is bound, bytes.
+    bound: u64,
+    /// The length of a result, bytes.
+    pub(super) bytes: u64,
+}
+
+impl ResultRange {
+    pub(super) fn new(
+        engine: &VulkanEngine,
+        encoding: Encoding,
+        buffer: VulkanBuffer,
+        values: usize,
+    ) -> Result<Self, VulkanError> {
+        let each = encoding.bytes() as u64;
+        let range = Self {
+            encoding,
+            buffer,
+            bound: engine.binding_before(buffer.offset, each),
+            bytes: values as u64 * each,
+        };
+        (engine.device.physical).check_range("the buffer", range.binding().size)?;
+        Ok(range)
+    }
+
+    pub(super) fn binding(&self) -> Binding {
+        let VulkanBuffer {
+            buffer,
+            offset,
+            size,
+        } = self.buffer;
+        Binding::range(buffer, self.bound, offset + size - self.bound)
+    }
+
+    /// The index in the binding of the first value of a result that starts `offset` bytes after the range's start.
+    pub(super) fn first(&self, offset: u64) -> Result<u32, VulkanError> {
+        let each = self.encoding.bytes() as u64;
+        let fits = offset
+            .checked_add(self.bytes)
+            .is_some_and(|end| end <= self.buffer.size);
+        if !fits || !offset.is_multiple_of(each) {
+            return Err(VulkanError::BufferRange {
+                offset: self.buffer.offset.saturating_add(offset),
+                size: self.buffer.size.saturating_sub(offset),
+                rotation: each,
+                needed: self.bytes,
+            });
+        }
+        Ok(((self.buffer.offset + offset - self.bound) / each) as u32)
+    }
+}
+
 /// Samples of a clip, prepared for recording into an application's commands, and the buffer for the result
 /// ([`Request::target`](crate::engine::clip::request::Request::target)). The work lists are on the device already:
 /// recording does not allocate.
@@ -155,12 +210,7 @@ pub struct ClipTarget {
     /// The recording, whose steps depend on the offset and are recorded again each time.
     work: Mutex<Recorded>,
     result: Resource,
-    encoding: Encoding,
-    buffer: VulkanBuffer,
-    /// The offset in bytes at which the buffer is bound.
-    bound: u64,
-    /// The length of the result in bytes.
-    bytes: u64,
+    range: ResultRange,
     // The descriptor sets refer to this buffer. The caller guarantees that no work that uses it is in flight when the
     // target is dropped.
     _segments: Arc<ClipBuffers>,
@@ -173,10 +223,7 @@ impl ClipTarget {
         whole: &Window,
         buffer: VulkanBuffer,
     ) -> Result<Self, EvaluateError> {
-        let each = job.encoding.bytes() as u64;
-        let bound = engine.binding_before(buffer.offset, each);
-        let range = buffer.offset + buffer.size - bound;
-        (engine.device.physical).check_range("the buffer", range)?;
+        let range = ResultRange::new(engine, job.encoding, buffer, whole.len())?;
         let values_per_window = engine
             .at_once()
             .unwrap_or_else(|| engine.window_of(job.encoding));
@@ -187,7 +234,7 @@ impl ClipTarget {
             values_per_window,
         )?;
         let mut work = Recorded::new(&engine.device);
-        let result = work.resource(Binding::range(buffer.buffer, bound, range));
+        let result = work.resource(range.binding());
         job.add_kept_sets(&lists, &mut work, result);
         work.bind(|kernel| engine.pipeline(kernel))?;
         let target = Self {
@@ -195,10 +242,7 @@ impl ClipTarget {
             lists,
             work: Mutex::new(work),
             result,
-            encoding: job.encoding,
-            buffer,
-            bound,
-            bytes: whole.len() as u64 * each,
+            range,
             _segments: Arc::clone(job.buffers),
         };
         // Record once now, so that later recordings need not allocate memory for their steps.
@@ -211,14 +255,14 @@ impl ClipTarget {
         let recording = &mut work.recording;
         recording.clear_steps();
         recording.wait_for_all();
-        let stored = self.engine.stored(self.encoding, 0, first);
+        let stored = self.engine.stored(self.range.encoding, 0, first);
         self.lists.record(recording, self.result, stored);
     }
 
     /// The length of the result in bytes.
     #[must_use]
     pub fn bytes(&self) -> u64 {
-        self.bytes
+        self.range.bytes
     }
 
     /// Records an evaluation into the application's command buffer. The result starts `offset` bytes after the start
@@ -260,23 +304,11 @@ impl ClipTarget {
         offset: u64,
         scopes: CommandScopes,
     ) -> Result<(), VulkanError> {
-        let each = self.encoding.bytes() as u64;
-        let fits = offset
-            .checked_add(self.bytes)
-            .is_some_and(|end| end <= self.buffer.size);
-        if !fits || !offset.is_multiple_of(each) {
-            return Err(VulkanError::BufferRange {
-                offset: self.buffer.offset.saturating_add(offset),
-                size: self.buffer.size.saturating_sub(offset),
-                rotation: each,
-                needed: self.bytes,
-            });
-        }
+        let first = self.range.first(offset)?;
         // SAFETY: promised by the caller.
         let commands = unsafe { Commands::new(&self.engine.device, commands) };
-        let first = (self.buffer.offset + offset - self.bound) / each;
         let mut work = lock(&self.work);
-        self.fill(&mut work, first as u32);
+        self.fill(&mut work, first);
         work.record(commands.between(scopes), &[]);
         Ok(())
     }
@@ -285,8 +317,8 @@ impl ClipTarget {
 impl std::fmt::Debug for ClipTarget {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("ClipTarget")
-            .field("encoding", &self.encoding)
-            .field("bytes", &self.bytes)
+            .field("encoding", &self.range.encoding)
+            .field("bytes", &self.range.bytes)
             .finish_non_exhaustive()
     }
 }

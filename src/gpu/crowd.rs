@@ -15,10 +15,12 @@ use crate::gpu::recorded::{Binding, Commands, Recorded};
 use crate::machine::crowd::{CrowdFrame, EntryChanges, VisibleInstances};
 use crate::machine::crowd::{CrowdSource, MachineCrowd};
 use crate::machine::error::VulkanError;
-use crate::output::crowd::{CrowdOutput, listed_changes};
+use crate::output::crowd::{CrowdOutput, CrowdStage, listed_changes};
 use crate::shader::{CrowdChange, CrowdEntry, CrowdLink};
 use crate::threads::lock;
-use crate::work::crowd::{self, CrowdDevice, CrowdResources, CrowdShape, FrameKernels, Frames};
+use crate::work::crowd::{
+    self, CrowdDevice, CrowdResources, CrowdShape, FrameKernels, Frames, StageResources, Stages,
+};
 
 /// The minimum number of instances of a window: with it, windows start at multiples of 256 bytes.
 const LEAST_WINDOW: u64 = 32;
@@ -135,18 +137,26 @@ impl DeviceCrowd {
 
     /// The kernels for a result.
     pub(crate) fn kernels(&self, output: CrowdOutput) -> FrameKernels {
-        let device = &self.engine.device;
-        let properties = CrowdDevice {
+        self.with_properties(|device| FrameKernels::new(&self.tables.shape, output, device))
+    }
+
+    /// The kernels of a stage.
+    fn stage_kernels(&self, stage: CrowdStage) -> FrameKernels {
+        self.with_properties(|device| FrameKernels::of_stage(&self.tables.shape, stage, device))
+    }
+
+    fn with_properties<T>(&self, choose: impl FnOnce(&CrowdDevice<'_>) -> T) -> T {
+        choose(&CrowdDevice {
             maps_samples: self.engine.maps_samples,
-            subgroup_lanes: device.physical.subgroup_lanes,
+            subgroup_lanes: self.engine.device.physical.subgroup_lanes,
             runs: &|kernel| self.engine.uses(kernel),
-        };
-        FrameKernels::new(&self.tables.shape, output, &properties)
+        })
     }
 }
 
 /// A range of an application's buffer for a crowd's results ([`Crowd::target`](crate::crowd::player::Crowd::target)),
-/// with all resources for recording.
+/// or for a stage that continues them ([`Crowd::stage_target`](crate::crowd::player::Crowd::stage_target)), with all
+/// resources for recording.
 pub struct CrowdTarget {
     /// The crowd that the target was made for; its buffers are in the descriptor sets.
     pub(crate) crowd: Arc<DeviceCrowd>,
@@ -155,12 +165,20 @@ pub struct CrowdTarget {
     pub(crate) range: Binding,
     /// The maximum number of instances.
     pub(crate) room: u32,
-    frames: Frames,
+    evaluation: Evaluation,
     /// The recording of a frame, which the next frame fills again.
     work: Mutex<Recorded>,
     // The descriptor sets refer to them. The caller guarantees that no work that uses them is in flight when the
     // target is dropped.
     _buffers: Vec<Buffer>,
+}
+
+/// The work that is recorded for a target.
+enum Evaluation {
+    /// Instances at the clock's time.
+    Frames(Frames),
+    /// Matrices that are in the range already.
+    Stages(Stages),
 }
 
 impl CrowdTarget {
@@ -233,10 +251,49 @@ impl CrowdTarget {
             output,
             range,
             room,
-            frames,
+            evaluation: Evaluation::Frames(frames),
             work: Mutex::new(work),
             _buffers: buffers,
         })
+    }
+
+    /// Makes a target for a stage of the matrices in a range that starts at `offset`, with room for `room` instances.
+    pub(crate) fn of_stage(
+        crowd: &Arc<DeviceCrowd>,
+        stage: CrowdStage,
+        (buffer, offset): (vk::Buffer, u64),
+        room: u32,
+    ) -> Result<Self, VulkanError> {
+        let (engine, tables) = (&crowd.engine, &crowd.tables);
+        let output = stage.output();
+        let range = Binding::range(buffer, offset, u64::from(room) * crowd.bytes(output));
+        let mut work = Recorded::new(&engine.device);
+        let resources = StageResources {
+            links: work.whole(&tables.links),
+            bind: work.whole(&tables.bind),
+            matrices: work.resource(range),
+        };
+        let (shape, kernels) = (tables.shape.clone(), crowd.stage_kernels(stage));
+        let windows = [crowd.window(), room];
+        let recording = &mut work.recording;
+        let stages = Stages::new(recording, shape, kernels, &resources, windows);
+        // As for frames.
+        stages.record(recording, room);
+        work.bind(|kernel| engine.pipeline(kernel))?;
+        Ok(Self {
+            crowd: Arc::clone(crowd),
+            output,
+            range,
+            room,
+            evaluation: Evaluation::Stages(stages),
+            work: Mutex::new(work),
+            _buffers: Vec::new(),
+        })
+    }
+
+    /// Whether it continues matrices that are in its range.
+    pub(crate) fn is_of_stage(&self) -> bool {
+        matches!(self.evaluation, Evaluation::Stages(_))
     }
 
     /// The output that is written to the buffer.
@@ -255,7 +312,10 @@ impl CrowdTarget {
     pub(crate) fn record(&self, commands: Commands<'_>, frame: &CrowdFrame<'_>) {
         let mut work = lock(&self.work);
         work.recording.clear_steps();
-        self.frames.record(&mut work.recording, frame);
+        match &self.evaluation {
+            Evaluation::Frames(frames) => frames.record(&mut work.recording, frame),
+            Evaluation::Stages(stages) => stages.record(&mut work.recording, frame.instances),
+        }
         work.record(commands, &crowd::inputs(frame));
     }
 }

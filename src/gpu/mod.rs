@@ -31,7 +31,8 @@
 //!    rotations that the host computed in f64 because no polynomial fits their curve.
 //!
 //! Sets with fewer samples than keys are evaluated by [`engine::from_keys`] without segments. Crowds have separate
-//! tables and targets ([`crowd`]), and so have states of motion libraries ([`motion`]). A [`ClipTarget`](clip::ClipTarget) records a clip into an application's commands;
+//! tables and targets ([`crowd`]), and so have states of motion libraries ([`motion`]). A [`ClipTarget`](clip::ClipTarget) records a clip into an application's commands,
+//! and a [`TimedTarget`](timed_clip::TimedTarget) at times that are known only then;
 //! [`passes`] runs passes over poses, or records them from buffer to buffer.
 //!
 //! # Memory
@@ -74,4 +75,5 @@ pub(crate) mod run_once;
 pub(crate) mod self_test;
 pub(crate) mod shared_memory;
 pub(crate) mod submission;
+pub(crate) mod timed_clip;
 pub(crate) mod upload;

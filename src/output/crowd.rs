@@ -25,6 +25,42 @@ names! {
     Skinning => "skinning",
 }
 
+/// Matrices of a crowd in a buffer that become those of a later stage, in place. The application may have changed
+/// them before.
+#[cfg(feature = "vulkan")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum CrowdStage {
+    /// [`CrowdValues::Local`] become [`CrowdValues::Model`], as by
+    /// [`CrowdLibrary::local_to_model`](crate::crowd::CrowdLibrary::local_to_model).
+    LocalToModel,
+    /// [`CrowdValues::Model`] become [`CrowdValues::Skinning`], as by
+    /// [`CrowdLibrary::model_to_skinning`](crate::crowd::CrowdLibrary::model_to_skinning).
+    ModelToSkinning,
+    /// [`CrowdValues::Local`] become [`CrowdValues::Skinning`], by both.
+    LocalToSkinning,
+}
+
+#[cfg(feature = "vulkan")]
+names! {
+    CrowdStage, "stage of a crowd",
+    LocalToModel => "local-to-model",
+    ModelToSkinning => "model-to-skinning",
+    LocalToSkinning => "local-to-skinning",
+}
+
+#[cfg(feature = "vulkan")]
+impl CrowdStage {
+    /// The values that it stores, in 32 bits.
+    #[must_use]
+    pub fn output(self) -> CrowdOutput {
+        match self {
+            Self::LocalToModel => CrowdValues::Model.into(),
+            Self::ModelToSkinning | Self::LocalToSkinning => CrowdValues::Skinning.into(),
+        }
+    }
+}
+
 /// The values that a crowd's evaluation stores, and their precision.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
@@ -105,6 +141,18 @@ impl FrameStep {
         ]
         .into_iter()
         .flatten()
+    }
+}
+
+#[cfg(feature = "vulkan")]
+impl FrameStep {
+    /// The steps of a stage, in their order: some of those of its output.
+    pub(crate) fn of_stage(stage: CrowdStage) -> impl Iterator<Item = Self> {
+        Self::of(stage.output()).filter(move |step| match step {
+            Self::Walk => stage != CrowdStage::ModelToSkinning,
+            Self::Skin => true,
+            Self::Positions | Self::Rotations | Self::Locals | Self::Half => false,
+        })
     }
 }
 

@@ -45,6 +45,14 @@ pub enum SampleTimesError {
         /// The number of tracks of the set.
         tracks: usize,
     },
+    /// The number of times differs from the number of samples that a target was made for.
+    #[error("{times} times; the target has {samples} samples of each track")]
+    Count {
+        /// The number of times.
+        times: usize,
+        /// The number of samples of each track.
+        samples: usize,
+    },
     /// There are more samples than [`MAX_FRAMES`], or than memory can address.
     #[error(
         "tracks × frames = {tracks} × {frames:.0}, which is {bytes:.0} bytes; at most {MAX_FRAMES} frames can be asked for"

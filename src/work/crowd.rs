@@ -1,7 +1,7 @@
 //! The recording of a crowd's frames, whose steps and their order are those of [`FrameStep`].
 
 use crate::machine::crowd::{CrowdFrame, EntryChanges, VisibleInstances};
-use crate::output::crowd::{CrowdOutput, FrameStep};
+use crate::output::crowd::{CrowdOutput, CrowdStage, FrameStep};
 use crate::shader::{
     CROWD_WORKGROUP, CrowdDispatch, CrowdEntry, CrowdPosition, Kernel, MAX_WALKED, WORKGROUP,
 };
@@ -21,6 +21,27 @@ pub(crate) struct CrowdShape {
 }
 
 impl CrowdShape {
+    /// Whether there is only one layer, and it has only arcs.
+    fn is_plain(&self) -> bool {
+        self.arguments.layers == 1 && self.only_arcs
+    }
+
+    /// The kernel of a step that is taken by itself.
+    fn kernel(&self, step: FrameStep, device: &CrowdDevice<'_>) -> Kernel {
+        let walks_at_once = device.maps_samples && self.arguments.joints <= MAX_WALKED;
+        match (step, self.is_plain()) {
+            (FrameStep::Positions, _) => Kernel::CrowdTimes,
+            (FrameStep::Rotations, true) => Kernel::CrowdPlainRotations,
+            (FrameStep::Rotations, false) => Kernel::CrowdRotations,
+            (FrameStep::Locals, true) => Kernel::CrowdPlainLocals,
+            (FrameStep::Locals, false) => Kernel::CrowdLocals,
+            (FrameStep::Walk, _) if walks_at_once => Kernel::CrowdWalkAll,
+            (FrameStep::Walk, _) => Kernel::CrowdWalk,
+            (FrameStep::Skin, _) => Kernel::CrowdSkin,
+            (FrameStep::Half, _) => Kernel::CrowdHalf,
+        }
+    }
+
     /// Bytes of the positions of the layers of one instance.
     pub(crate) fn position_bytes(&self) -> u64 {
         let CrowdDispatch { layers, bases, .. } = self.arguments;
@@ -91,22 +112,9 @@ pub(crate) struct FrameKernels {
 
 impl FrameKernels {
     pub(crate) fn new(shape: &CrowdShape, output: CrowdOutput, device: &CrowdDevice<'_>) -> Self {
-        let arguments = &shape.arguments;
-        // There is only one layer, and it has only arcs.
-        let is_plain = arguments.layers == 1 && shape.only_arcs;
-        let whole = WholeKernel::new(arguments, output, is_plain, device);
-        let walks_at_once = device.maps_samples && arguments.joints <= MAX_WALKED;
-        let of_step = |step| match (step, is_plain) {
-            (FrameStep::Positions, _) => Kernel::CrowdTimes,
-            (FrameStep::Rotations, true) => Kernel::CrowdPlainRotations,
-            (FrameStep::Rotations, false) => Kernel::CrowdRotations,
-            (FrameStep::Locals, true) => Kernel::CrowdPlainLocals,
-            (FrameStep::Locals, false) => Kernel::CrowdLocals,
-            (FrameStep::Walk, _) if walks_at_once => Kernel::CrowdWalkAll,
-            (FrameStep::Walk, _) => Kernel::CrowdWalk,
-            (FrameStep::Skin, _) => Kernel::CrowdSkin,
-            (FrameStep::Half, _) => Kernel::CrowdHalf,
-        };
+        let is_plain = shape.is_plain();
+        let whole = WholeKernel::new(&shape.arguments, output, is_plain, device);
+        let of_step = |step| shape.kernel(step, device);
         Self {
             output,
             kernels: match &whole {
@@ -115,6 +123,83 @@ impl FrameKernels {
             },
             whole,
         }
+    }
+
+    /// The kernels of a stage, whose matrices are in the result's memory already.
+    pub(crate) fn of_stage(
+        shape: &CrowdShape,
+        stage: CrowdStage,
+        device: &CrowdDevice<'_>,
+    ) -> Self {
+        let of_step = |step| shape.kernel(step, device);
+        Self {
+            output: stage.output(),
+            kernels: FrameStep::of_stage(stage).map(of_step).collect(),
+            whole: None,
+        }
+    }
+
+    /// Records a kernel over the instances of a window.
+    fn dispatch(
+        &self,
+        recording: &mut Recording,
+        (kernel, set): (Kernel, Set),
+        levels: &[u32],
+        instances: u32,
+        arguments: CrowdDispatch,
+    ) {
+        const _: () = assert!(CROWD_WORKGROUP == WORKGROUP);
+        let joints = instances * arguments.joints;
+        if let Some(whole) = &self.whole {
+            let count = instances;
+            let arguments = CrowdDispatch { count, ..arguments };
+            return match whole {
+                WholeKernel::Subgroups(whole) => {
+                    let (pushed, groups) = whole.dispatch(&arguments);
+                    recording.dispatch(set, &pushed, [groups, 1, 1]);
+                }
+                WholeKernel::Workgroups(whole) => {
+                    let (pushed, groups) = whole.dispatch(arguments, levels);
+                    recording.dispatch(set, &pushed, [groups, 1, 1]);
+                }
+            };
+        }
+        let count = match kernel {
+            Kernel::CrowdTimes => instances * arguments.layers * arguments.bases,
+            Kernel::CrowdSkin => 3 * joints,
+            Kernel::CrowdHalf => joints * self.output.vector_count() as u32,
+            Kernel::CrowdWalkAll => {
+                let level_count = levels.len() - 1;
+                let walk = CrowdDispatch {
+                    count: instances,
+                    layers: level_count as u32,
+                    first_link: levels[level_count],
+                    ..arguments
+                };
+                return recording.dispatch(set, &walk, [instances, 1, 1]);
+            }
+            Kernel::CrowdWalk => {
+                for level in levels.windows(2).filter(|level| level[0] < level[1]) {
+                    let joints = level[1] - level[0];
+                    let count = instances * joints;
+                    let walk = CrowdDispatch {
+                        count,
+                        joints,
+                        layers: arguments.joints,
+                        first_link: level[0],
+                        ..arguments
+                    };
+                    recording.dispatch(set, &walk, workgroups(count));
+                }
+                return;
+            }
+            _ => joints,
+        };
+        recording.dispatch(
+            set,
+            &CrowdDispatch { count, ..arguments },
+            workgroups(count),
+        );
     }
 }
 
@@ -267,7 +352,8 @@ impl Frames {
                     true => 0,
                     false => first_instance,
                 };
-                self.dispatch(recording, kernel, set, instances, arguments);
+                let levels = &self.shape.levels;
+                (self.kernels).dispatch(recording, (kernel, set), levels, instances, arguments);
             }
         }
         recording.publish();
@@ -303,69 +389,69 @@ impl Frames {
             }
         }
     }
+}
 
-    /// Records a kernel over the instances of a window.
-    fn dispatch(
-        &self,
+/// Stages of a crowd in a recording, whose kernels are bound. They change matrices in place.
+pub(crate) struct Stages {
+    shape: CrowdShape,
+    kernels: FrameKernels,
+    /// The number of instances of a window.
+    window: u32,
+    /// The sets of each window's kernels.
+    windows: Vec<Vec<Set>>,
+}
+
+/// The tables of a crowd and the memory of the matrices in a recording of stages.
+pub(crate) struct StageResources {
+    pub(crate) links: Resource,
+    pub(crate) bind: Resource,
+    pub(crate) matrices: Resource,
+}
+
+impl Stages {
+    /// Adds the sets for windows of `window` instances, `room` in all.
+    pub(crate) fn new(
         recording: &mut Recording,
-        kernel: Kernel,
-        set: Set,
-        instances: u32,
-        arguments: CrowdDispatch,
-    ) {
-        const _: () = assert!(CROWD_WORKGROUP == WORKGROUP);
-        let levels = &self.shape.levels;
-        let joints = instances * arguments.joints;
-        if let Some(whole) = &self.kernels.whole {
-            let count = instances;
-            let arguments = CrowdDispatch { count, ..arguments };
-            return match whole {
-                WholeKernel::Subgroups(whole) => {
-                    let (pushed, groups) = whole.dispatch(&arguments);
-                    recording.dispatch(set, &pushed, [groups, 1, 1]);
-                }
-                WholeKernel::Workgroups(whole) => {
-                    let (pushed, groups) = whole.dispatch(arguments, levels);
-                    recording.dispatch(set, &pushed, [groups, 1, 1]);
-                }
-            };
-        }
-        let count = match kernel {
-            Kernel::CrowdTimes => instances * arguments.layers * arguments.bases,
-            Kernel::CrowdSkin => 3 * joints,
-            Kernel::CrowdHalf => joints * self.kernels.output.vector_count() as u32,
-            Kernel::CrowdWalkAll => {
-                let level_count = levels.len() - 1;
-                let walk = CrowdDispatch {
-                    count: instances,
-                    layers: level_count as u32,
-                    first_link: levels[level_count],
-                    ..arguments
+        shape: CrowdShape,
+        kernels: FrameKernels,
+        resources: &StageResources,
+        [window, room]: [u32; 2],
+    ) -> Self {
+        let each = shape.bytes(kernels.output);
+        let windows = (0..room).step_by(window as usize).map(|first| {
+            let count = window.min(room - first);
+            let matrices =
+                (resources.matrices).slice(u64::from(first) * each, u64::from(count) * each);
+            let sets = kernels.kernels.iter().map(|&kernel| {
+                let table = match kernel {
+                    Kernel::CrowdSkin => resources.bind,
+                    _ => resources.links,
                 };
-                return recording.dispatch(set, &walk, [instances, 1, 1]);
+                recording.set(kernel, [table.into(), matrices])
+            });
+            sets.collect()
+        });
+        let windows = windows.collect();
+        Self {
+            shape,
+            kernels,
+            window,
+            windows,
+        }
+    }
+
+    /// Records the stages of the first instances, at most as many as there is room for.
+    pub(crate) fn record(&self, recording: &mut Recording, instances: u32) {
+        recording.wait_for_all();
+        let firsts = (0..instances).step_by(self.window as usize);
+        for (first, sets) in firsts.zip(&self.windows) {
+            let count = self.window.min(instances - first);
+            for (&kernel, &set) in self.kernels.kernels.iter().zip(sets) {
+                let (levels, arguments) = (&self.shape.levels, self.shape.arguments);
+                (self.kernels).dispatch(recording, (kernel, set), levels, count, arguments);
             }
-            Kernel::CrowdWalk => {
-                for level in levels.windows(2).filter(|level| level[0] < level[1]) {
-                    let joints = level[1] - level[0];
-                    let count = instances * joints;
-                    let walk = CrowdDispatch {
-                        count,
-                        joints,
-                        layers: arguments.joints,
-                        first_link: level[0],
-                        ..arguments
-                    };
-                    recording.dispatch(set, &walk, workgroups(count));
-                }
-                return;
-            }
-            _ => joints,
-        };
-        recording.dispatch(
-            set,
-            &CrowdDispatch { count, ..arguments },
-            workgroups(count),
-        );
+        }
+        recording.publish();
     }
 }
 
@@ -425,10 +511,9 @@ mod tests {
     use crate::shader::CrowdChange;
     use crate::work::recording::tests::letters;
 
-    /// The steps of a frame of 40 instances of three joints on two levels, in windows of 32.
-    fn steps(output: CrowdOutput, maps_samples: bool, frame: &CrowdFrame<'_>) -> String {
-        let mut recording = Recording::default();
-        let shape = CrowdShape {
+    /// Instances of three joints on two levels.
+    fn shape() -> CrowdShape {
+        CrowdShape {
             levels: vec![0, 1, 1, 2],
             only_arcs: true,
             arguments: CrowdDispatch {
@@ -437,13 +522,28 @@ mod tests {
                 bases: 1,
                 ..CrowdDispatch::zeroed()
             },
-        };
-        let device = CrowdDevice {
+        }
+    }
+
+    fn device(maps_samples: bool) -> CrowdDevice<'static> {
+        CrowdDevice {
             maps_samples,
             subgroup_lanes: None,
             runs: &|_| true,
-        };
-        let kernels = FrameKernels::new(&shape, output, &device);
+        }
+    }
+
+    /// The steps of a recording: `^` waits for all that was before, `|` for kernels.
+    fn short(recording: &Recording) -> String {
+        let [all, kernel] = ["[Any>KernelAndCopy]", "[Kernel>Kernel]"];
+        letters(recording).replace(all, "^").replace(kernel, "|")
+    }
+
+    /// The steps of a frame of 40 instances, in windows of 32.
+    fn steps(output: CrowdOutput, maps_samples: bool, frame: &CrowdFrame<'_>) -> String {
+        let mut recording = Recording::default();
+        let shape = shape();
+        let kernels = FrameKernels::new(&shape, output, &device(maps_samples));
         let has_values = output.is_half && kernels.whole.is_none();
         let mut next = || recording.resource();
         let resources = CrowdResources {
@@ -464,8 +564,7 @@ mod tests {
         };
         let frames = Frames::new(&mut recording, shape, kernels, resources, [32, 40]);
         frames.record(&mut recording, frame);
-        let [all, kernel] = ["[Any>KernelAndCopy]", "[Kernel>Kernel]"];
-        letters(&recording).replace(all, "^").replace(kernel, "|")
+        short(&recording)
     }
 
     fn frame<'a>(changes: EntryChanges<'a>, visible: VisibleInstances<'a>) -> CrowdFrame<'a> {
@@ -477,7 +576,7 @@ mod tests {
         }
     }
 
-    /// `^` waits for all that was before, `|` for kernels; a level without links has no dispatch.
+    /// A level without links has no dispatch.
     #[test]
     fn each_step_waits_for_what_it_reads() {
         let half = CrowdOutput::half(CrowdValues::Skinning);
@@ -494,6 +593,32 @@ mod tests {
         );
         // With whole instances, windows do not depend on each other.
         assert_eq!(steps(half, true, &unchanged()), "^DD[Kernel>Any]");
+    }
+
+    /// Stages wait for the matrices, and each for the stage before it.
+    #[test]
+    fn stages_are_the_last_steps_of_a_frame() {
+        use CrowdStage::{LocalToModel, LocalToSkinning, ModelToSkinning};
+        let stages = |stage, maps_samples, instances| {
+            let mut recording = Recording::default();
+            let shape = shape();
+            let kernels = FrameKernels::of_stage(&shape, stage, &device(maps_samples));
+            let mut next = || recording.resource();
+            let resources = StageResources {
+                links: next(),
+                bind: next(),
+                matrices: next(),
+            };
+            let stages = Stages::new(&mut recording, shape, kernels, &resources, [32, 40]);
+            stages.record(&mut recording, instances);
+            short(&recording)
+        };
+        assert_eq!(stages(LocalToModel, false, 32), "^D|D[Kernel>Any]");
+        assert_eq!(stages(ModelToSkinning, false, 32), "^D[Kernel>Any]");
+        assert_eq!(stages(LocalToSkinning, false, 32), "^D|D|D[Kernel>Any]");
+        assert_eq!(stages(LocalToSkinning, true, 32), "^D|D[Kernel>Any]");
+        assert_eq!(stages(LocalToSkinning, true, 40), "^D|D|D|D[Kernel>Any]");
+        assert_eq!(stages(LocalToModel, true, 0), "^");
     }
 
     #[test]

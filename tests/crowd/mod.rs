@@ -5,6 +5,7 @@ mod application_device;
 mod device_motions;
 mod fades;
 mod refusals;
+mod stages;
 mod states;
 mod visible;
 

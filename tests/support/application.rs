@@ -276,20 +276,27 @@ impl<'a> ApplicationBuffer<'a> {
     pub(crate) fn of(application: &'a Application, bytes: &[u8]) -> Self {
         let size = bytes.len() as u64;
         let (buffer, memory) = application.buffer(size);
-        // SAFETY: nothing else uses the memory now.
-        unsafe {
-            let flags = vk::MemoryMapFlags::empty();
-            let device = &application.device;
-            let pointer = device.map_memory(memory, 0, size, flags).unwrap();
-            std::slice::from_raw_parts_mut(pointer.cast::<u8>(), bytes.len())
-                .copy_from_slice(bytes);
-            device.unmap_memory(memory);
-        }
-        Self {
+        let made = Self {
             application,
             buffer,
             memory,
             size,
+        };
+        made.write(bytes);
+        made
+    }
+
+    /// Writes all its bytes.
+    pub(crate) fn write(&self, bytes: &[u8]) {
+        assert_eq!(bytes.len() as u64, self.size);
+        // SAFETY: nothing else uses the memory now.
+        unsafe {
+            let flags = vk::MemoryMapFlags::empty();
+            let device = &self.application.device;
+            let pointer = device.map_memory(self.memory, 0, self.size, flags);
+            std::slice::from_raw_parts_mut(pointer.unwrap().cast::<u8>(), bytes.len())
+                .copy_from_slice(bytes);
+            device.unmap_memory(self.memory);
         }
     }
 

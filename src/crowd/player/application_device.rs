@@ -12,7 +12,7 @@ use crate::gpu::crowd::{CrowdTarget, DeviceCrowd, VulkanCrowd};
 use crate::gpu::handles::VulkanBuffer;
 use crate::gpu::recorded::{CommandScopes, Commands};
 use crate::machine::crowd::MachineCrowd;
-use crate::output::crowd::CrowdOutput;
+use crate::output::crowd::{CrowdOutput, CrowdStage};
 use crate::output::pose_error::OFFSET_STEP;
 
 impl Crowd {
@@ -40,6 +40,43 @@ impl Crowd {
         buffer: VulkanBuffer,
     ) -> Result<CrowdTarget, CrowdError> {
         let output = output.into();
+        let (device, room) = self.room_in(output, buffer)?;
+        let range = (buffer.buffer, buffer.offset);
+        Ok(CrowdTarget::new(device, output, range, room)?)
+    }
+
+    /// Prepares a stage that continues matrices in a range of the application's buffer, in place, in 32 bits.
+    ///
+    /// A frame is then, for example: [`Crowd::record`] with a target for
+    /// [`CrowdValues::Local`](crate::crowd::CrowdValues::Local) in this range, the application's own commands that change
+    /// these matrices (inverse kinematics), and [`Crowd::record`] with the stage's target, which makes them skinning
+    /// matrices. The stage continues the matrices of as many instances as are [visible](Crowd::set_visible) when it is
+    /// recorded, whatever wrote them: a kernel, a copy, or the host before the commands are submitted.
+    ///
+    /// Results have the bits of the functions on the CPU that [`CrowdStage`] names, if all numbers are finite and less
+    /// than 2^36 in magnitude. Where nothing was changed, they have the bits of an evaluation without stages.
+    ///
+    /// # Errors
+    /// As for [`Crowd::target`].
+    ///
+    /// # Safety
+    /// As for [`Crowd::target`].
+    pub unsafe fn stage_target(
+        &self,
+        stage: CrowdStage,
+        buffer: VulkanBuffer,
+    ) -> Result<CrowdTarget, CrowdError> {
+        let (device, room) = self.room_in(stage.output(), buffer)?;
+        let range = (buffer.buffer, buffer.offset);
+        Ok(CrowdTarget::of_stage(device, stage, range, room)?)
+    }
+
+    /// The crowd on the application's device, and the number of instances for which a range has room.
+    fn room_in(
+        &self,
+        output: CrowdOutput,
+        buffer: VulkanBuffer,
+    ) -> Result<(&Arc<DeviceCrowd>, u32), CrowdError> {
         // On a device that the engine opened, an application has no buffers.
         let device = vulkan_crowd(self.device.as_deref());
         let device = device.filter(|device| !device.engine.device.owned);
@@ -57,17 +94,16 @@ impl Crowd {
             });
         }
         let room = (size / each).min(self.instance_count() as u64) as u32;
-        let range = (buffer.buffer, offset);
-        Ok(CrowdTarget::new(device, output, range, room)?)
+        Ok((device, room))
     }
 
-    /// Records an evaluation at the clock's time into the application's command buffer.
+    /// Records an evaluation at the clock's time, or the stage of the target, into the application's command buffer.
     ///
     /// The commands write up to 20 bytes for each layer that changed since the last evaluation and 4 bytes for each
-    /// instance of a new [list](Crowd::set_visible), and dispatch the kernels. If no instance is visible, nothing is
-    /// recorded. Recording neither waits nor allocates. Barriers are included: the evaluation waits for all commands
-    /// recorded before it, and commands that are recorded after it, or submitted to the same queue later, see the
-    /// result.
+    /// instance of a new [list](Crowd::set_visible), and dispatch the kernels. A [stage](Crowd::stage_target) writes
+    /// none of these changes; they remain for the next evaluation. If no instance is visible, nothing is recorded.
+    /// Recording neither waits nor allocates. Barriers are included: the evaluation waits for all commands recorded
+    /// before it, and commands that are recorded after it, or submitted to the same queue later, see the result.
     ///
     /// # Errors
     /// When the target belongs to another crowd, or more instances are visible than it has room for; then nothing is
@@ -121,7 +157,11 @@ impl Crowd {
             let commands = unsafe { Commands::new(&device.engine.device, commands) };
             let layers = self.layer_count();
             let commands = commands.between(scopes.with_earlier_recordings());
-            target.record(commands, &self.instances.take_frame(layers));
+            let frame = match target.is_of_stage() {
+                true => self.instances.frame_of_stage(layers),
+                false => self.instances.take_frame(layers),
+            };
+            target.record(commands, &frame);
         }
         Ok(())
     }

@@ -263,7 +263,31 @@ impl Lister {
             self.take_back(lists);
             lists = work(clip, timeline, window, Cut::Short, &mut self.spare)?;
         }
+        self.write_items(lists, rows, &grids, timeline, memory)
+    }
 
+    /// Lists a window as items, one for each invocation, whatever the device and the times are. There are at most twice
+    /// as many as samples, because a sample within rounding of the boundary between two parts may come from both.
+    pub(crate) fn list_items<'r, R: ListRoom<'r>>(
+        &mut self,
+        request: ListRequest<'_>,
+        window: &Window,
+        memory: R,
+    ) -> Result<Work, R::Error> {
+        let ListRequest { clip, timeline, .. } = request;
+        let lists = work(clip, timeline, window, Cut::Short, &mut self.spare)?;
+        self.write_items(lists, None, &[], timeline, memory)
+    }
+
+    /// Writes items, and for a grid its blocks, into a device's memory.
+    fn write_items<'r, R: ListRoom<'r>>(
+        &mut self,
+        lists: Vec<GroupWork>,
+        rows: Option<GridRows>,
+        grids: &[GroupGrid],
+        timeline: &Timeline,
+        memory: R,
+    ) -> Result<Work, R::Error> {
         let chunks = lists.iter().flat_map(|list| &list.chunks);
         let item_count: usize = lists.iter().map(GroupWork::item_count).sum();
         let distance_count: usize = chunks.map(|chunk| chunk.distances.len()).sum();
@@ -280,7 +304,7 @@ impl Lister {
         if rows.is_some() {
             // Blocks are written in any order and read meanwhile, so this is not done in the device's memory.
             self.listed_blocks.resize(block_count, Block::zeroed());
-            write_blocks(&lists, &grids, item_count as u32, &mut self.listed_blocks);
+            write_blocks(&lists, grids, item_count as u32, &mut self.listed_blocks);
             copy(blocks, bytemuck::cast_slice(&self.listed_blocks));
         }
 

@@ -4,13 +4,20 @@
 
 use std::sync::Arc;
 
-use crate::engine::clip::request::{Request, RequestPart};
+use ash::vk;
+
+use crate::engine::clip::request::on_device::on_vulkan;
+use crate::engine::clip::request::{Request, RequestPart, RequestSource};
 use crate::error::Error;
 use crate::gpu::clip::ClipTarget;
 use crate::gpu::engine::VulkanEngine;
 use crate::gpu::handles::VulkanBuffer;
 use crate::gpu::job::Job;
+use crate::gpu::recorded::{CommandScopes, Commands};
+use crate::gpu::timed_clip::TimedTarget;
+use crate::machine::MachineClip as _;
 use crate::machine::error::VulkanError;
+use crate::output::window::Window;
 
 impl Request<'_> {
     /// Evaluates into a buffer of the application, on the device that the engine was made from
@@ -58,6 +65,45 @@ impl Request<'_> {
         })
     }
 
+    /// Prepares this request for recording at times that are known only when they are recorded
+    /// ([`TimedTarget::record`]): for a clip at another time in each frame. The request's own times say how many samples
+    /// there are. The kernels are compiled here. A set is prepared and uploaded here as a whole.
+    ///
+    /// # Errors
+    /// As [`Request::target`].
+    ///
+    /// # Safety
+    /// As [`Request::target`].
+    pub unsafe fn timed_target(&self, buffer: VulkanBuffer) -> Result<TimedTarget, Error> {
+        let (engine, part) = self.for_buffer(buffer)?;
+        let prepared;
+        let clip = match &self.source {
+            RequestSource::Clip(clip) => *clip,
+            RequestSource::Set {
+                engine,
+                set,
+                interpolation,
+            } => {
+                prepared = engine.upload(set, *interpolation)?;
+                &prepared
+            }
+            RequestSource::Grouped(_) => return Err(Error::SeveralInterpolations),
+        };
+        let clip = on_vulkan(clip.uploaded()?.prepared()?)?;
+        let samples = 0..part.window.samples.len();
+        let window = Window::of(part.window.tracks.clone(), samples, self.layout);
+        let target = |_: &VulkanEngine, job: Job<'_>| {
+            TimedTarget::new(
+                &engine,
+                job,
+                Arc::clone(clip.data()),
+                window.clone(),
+                buffer,
+            )
+        };
+        Ok(clip.on_device(&part.timeline, self.encoding, target)?)
+    }
+
     /// The device and the part of the result, if the result fits the range of the buffer.
     fn for_buffer(&self, buffer: VulkanBuffer) -> Result<(Arc<VulkanEngine>, RequestPart), Error> {
         let Some(opened) = self.source.engine().opened() else {
@@ -80,5 +126,53 @@ impl Request<'_> {
             }));
         }
         Ok((engine, part))
+    }
+}
+
+impl TimedTarget {
+    /// Records an evaluation at these times, seconds, into the application's command buffer: as many as the request has
+    /// samples, the same for all tracks. The result starts `offset` bytes after the start of the target's range. It has
+    /// the bits of an evaluation at [`SampleTimes::at`](crate::SampleTimes::at) these times.
+    ///
+    /// Nothing is submitted or waited for. The host finds the segment of each sample, because a device would round its
+    /// time before, and the commands contain what it found: about 28 bytes for each sample of a track. Barriers are
+    /// included, as for [`ClipTarget::record`](crate::gpu::clip::ClipTarget::record). Several recordings of a target may
+    /// be in flight on one queue. If the commands are submitted again, they evaluate the same times.
+    ///
+    /// # Errors
+    /// When there is another number of times, a time is not finite, the result does not fit at this offset, `offset` is
+    /// not a multiple of a value's size, or there is not enough memory; then nothing is recorded.
+    ///
+    /// # Safety
+    /// As for [`ClipTarget::record`](crate::gpu::clip::ClipTarget::record).
+    pub unsafe fn record(
+        &self,
+        commands: vk::CommandBuffer,
+        offset: u64,
+        times: &[f64],
+    ) -> Result<(), Error> {
+        // SAFETY: promised by the caller.
+        unsafe { self.record_between(commands, offset, times, CommandScopes::default()) }
+    }
+
+    /// As [`TimedTarget::record`], with barriers only for the commands that use the result's memory (`scopes`).
+    /// Earlier recordings of the target are waited for in any case.
+    ///
+    /// # Errors
+    /// As for [`TimedTarget::record`].
+    ///
+    /// # Safety
+    /// As for [`ClipTarget::record_between`](crate::gpu::clip::ClipTarget::record_between).
+    pub unsafe fn record_between(
+        &self,
+        commands: vk::CommandBuffer,
+        offset: u64,
+        times: &[f64],
+        scopes: CommandScopes,
+    ) -> Result<(), Error> {
+        // SAFETY: promised by the caller.
+        let commands = unsafe { Commands::new(&self.engine().device, commands) };
+        let commands = commands.between(scopes.with_earlier_recordings());
+        Ok(self.record_at(commands, offset, times)?)
     }
 }
