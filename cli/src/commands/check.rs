@@ -222,23 +222,23 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         let missing = missing.join(", ");
         // A manifest is recognised by its first line.
         let is_known = shards.is_some() || entry::open(folder).is_ok();
-        let gone = match (of_removed_clips > 0, !absent.orphans.is_empty()) {
+        let pruned = match (of_removed_clips > 0, !absent.orphans.is_empty()) {
             (false, false) => None,
             (true, false) => Some("those of clips that are gone"),
             (false, true) => Some("those without inputs"),
             (true, true) => Some("those without inputs and of clips that are gone"),
         };
-        let remedy = match (is_known, gone) {
+        let remedy = match (is_known, pruned) {
             (true, _) if lines.damaged > 0 => {
                 "`--resume` does not recognise a result whose line is damaged: `tumble eval … --overwrite` \
                  makes all results again"
                     .to_owned()
             }
-            (true, Some(gone)) if is_made_again => {
-                format!("`tumble eval … --resume --prune` makes them again, and removes {gone}")
+            (true, Some(pruned)) if is_made_again => {
+                format!("`tumble eval … --resume --prune` makes them again, and removes {pruned}")
             }
             (true, None) if is_made_again => "`tumble eval … --resume` makes them again".to_owned(),
-            (true, Some(gone)) => format!("`tumble eval … --resume --prune` removes {gone}"),
+            (true, Some(pruned)) => format!("`tumble eval … --resume --prune` removes {pruned}"),
             (true, None) if has_failed => "`tumble eval … --resume` tries them again".to_owned(),
             (true, None) => String::new(),
             (false, _) => {
