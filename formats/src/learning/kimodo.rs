@@ -175,9 +175,9 @@ impl Accelerations {
         let weight = 0.25 * libm::sqrt(largest);
         let mut diagonal = vec![0.0; frames];
         let mut below = vec![[0.0; 2]; frames];
-        for column in 0..frames {
-            let mut pivot = bands[column][0] + weight;
-            let mut beside = bands[column][1];
+        for (column, [middle, first, second]) in bands.into_iter().enumerate() {
+            let mut pivot = middle + weight;
+            let mut beside = first;
             for back in 1..=2.min(column) {
                 let before = column - back;
                 let factor = below[before][back - 1] * diagonal[before];
@@ -187,7 +187,7 @@ impl Accelerations {
                 }
             }
             diagonal[column] = pivot;
-            below[column] = [beside / pivot, bands[column][2] / pivot];
+            below[column] = [beside / pivot, second / pivot];
         }
         Self {
             weight,
