@@ -448,7 +448,7 @@ fn results_without_inputs_are_told_and_pruned() {
     let check = run(folder, &["check", "out"]);
     assert_eq!(check.code, 8, "{}", check.words);
     let removed = "2 results have no input any more (the first: deep/b.npy); `tumble eval … --resume --prune` removes \
-                   those whose inputs or clips are gone";
+                   those without inputs";
     assert!(check.words.contains(removed), "{}", check.words);
     succeed(folder, &["check", "out", "--results-only"]);
     // A file that no longer matches its line of the manifest stays.

@@ -1044,7 +1044,7 @@ fn scalars_alone_are_compared() {
 fn the_largest_is_the_first_of_the_table() {
     let temporary = tempfile::tempdir().unwrap();
     let folder = temporary.path();
-    let body = |x: [f64; 2], turned: &str| {
+    let body = |x: [f64; 2], angles: &str| {
         let joint = |name: &str| {
             format!(
                 " JOINT {name}\n {{\n  OFFSET 0 0 0\n  CHANNELS 4 Xposition Xrotation Yrotation Zrotation\n  End \
@@ -1053,7 +1053,7 @@ fn the_largest_is_the_first_of_the_table() {
         };
         format!(
             "HIERARCHY\nROOT Hips\n{{\n OFFSET 0 0 0\n CHANNELS 3 Xrotation Yrotation Zrotation\n{}{}}}\nMOTION\n\
-             Frames: 2\nFrame Time: 0.5\n0 0 0 0 0 0 0 0 0 0 0\n0 0 0 {} {turned} {} {turned}\n",
+             Frames: 2\nFrame Time: 0.5\n0 0 0 0 0 0 0 0 0 0 0\n0 0 0 {} {angles} {} {angles}\n",
             joint("Left"),
             joint("Right"),
             x[0],

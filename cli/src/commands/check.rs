@@ -230,23 +230,28 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         let missing = missing.join(", ");
         // A manifest is recognised by its first line.
         let is_known = shards.is_some() || entry::open(folder).is_ok();
-        let is_pruned = of_removed_clips > 0 || !absent.orphans.is_empty();
-        let remedy = match is_known {
-            true if lines.damaged > 0 => {
+        let pruned = match (of_removed_clips > 0, !absent.orphans.is_empty()) {
+            (false, false) => None,
+            (true, false) => Some("those of clips that are gone"),
+            (false, true) => Some("those without inputs"),
+            (true, true) => Some("those without inputs and of clips that are gone"),
+        };
+        let remedy = match (is_known, pruned) {
+            (true, _) if lines.damaged > 0 => {
                 "`--resume` does not recognise a result whose line is damaged: `tumble eval … --overwrite` \
                  makes all results again"
+                    .to_owned()
             }
-            true if is_made_again && is_pruned => {
-                "`tumble eval … --resume --prune` makes them again, and removes those whose inputs or clips are gone"
+            (true, Some(pruned)) if is_made_again => {
+                format!("`tumble eval … --resume --prune` makes them again, and removes {pruned}")
             }
-            true if is_made_again => "`tumble eval … --resume` makes them again",
-            true if is_pruned => {
-                "`tumble eval … --resume --prune` removes those whose inputs or clips are gone"
-            }
-            true if has_failed => "`tumble eval … --resume` tries them again",
-            true => "",
-            false => {
+            (true, None) if is_made_again => "`tumble eval … --resume` makes them again".to_owned(),
+            (true, Some(pruned)) => format!("`tumble eval … --resume --prune` removes {pruned}"),
+            (true, None) if has_failed => "`tumble eval … --resume` tries them again".to_owned(),
+            (true, None) => String::new(),
+            (false, _) => {
                 "the first line of the manifest is damaged: `tumble eval … --overwrite` makes all results again"
+                    .to_owned()
             }
         };
         let elsewhere = match absent.elsewhere.is_empty() {
@@ -255,7 +260,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
                 "run it in the directory in which the batch ran, or add --results-only to check the results alone"
             }
         };
-        let parts = [&*missing, remedy, elsewhere];
+        let parts = [&*missing, &*remedy, elsewhere];
         let parts: Vec<&str> = parts.into_iter().filter(|part| !part.is_empty()).collect();
         return Err(Failure::new(DIFFERENCE, parts.join("; ")));
     }

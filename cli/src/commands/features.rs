@@ -180,8 +180,8 @@ fn warn_of_other_units(name: &str, rate: FrameRate, poses: &WorldFrames) {
 
 /// Refuses skeletons whose joints have other axes at rest than those of SMPL, which are the axes of the world.
 fn check_rest(name: &str, clip: &Motion) -> Result<(), Failure> {
-    let is_turned = |joint: &&Joint| joint.rest.rotation.w.abs() < 1.0 - 1e-6;
-    match clip.skeleton.iter().find(is_turned) {
+    let is_rotated = |joint: &&Joint| joint.rest.rotation.w.abs() < 1.0 - 1e-6;
+    match clip.skeleton.iter().find(is_rotated) {
         None => Ok(()),
         Some(_) => Err(Failure::new(
             ALL_INPUTS,

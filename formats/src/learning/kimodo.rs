@@ -38,7 +38,7 @@ const FEWEST_FRAMES: usize = 5;
 pub enum KimodoError {
     /// The smooth root needs more frames.
     #[error("Kimodo's smooth root needs {FEWEST_FRAMES} frames or more, and there are {frames}")]
-    FewFrames {
+    TooFewFrames {
         /// How many frames there are.
         frames: usize,
     },
@@ -56,7 +56,7 @@ pub fn kimodo(
 ) -> Result<Vec<[f64; KIMODO_NUMBERS]>, KimodoError> {
     let frames = positions.len();
     if frames < FEWEST_FRAMES {
-        return Err(KimodoError::FewFrames { frames });
+        return Err(KimodoError::TooFewFrames { frames });
     }
     let hips: Vec<DVec2> = positions.iter().map(|all| on_ground(all[0])).collect();
     let smooth = smooth_root(&hips);
@@ -104,22 +104,22 @@ fn smooth_root(path: &[DVec2]) -> Vec<DVec2> {
         let every = |path: &[DVec2]| -> Vec<DVec2> { path.iter().copied().step_by(step).collect() };
         let found = smoothed(&every(path), &every(&smooth));
         let last = found.len() - 1;
-        let beyond = found[last] + (found[last] - found[last - 1]) / 2.0;
+        let after_last = found[last] + (found[last] - found[last - 1]) / 2.0;
         for (index, &position) in found.iter().enumerate() {
             smooth[index * step] = position;
         }
-        // Frames halfway between these; beyond the last, on its line. For the last resolution they are the same frames.
+        // Frames halfway between these; after the last, on its line. For the last resolution they are the same frames.
         let half = step / 2;
         let between = (half..frames).step_by(step);
-        let ends_beyond = between.clone().count() == found.len();
+        let ends_after = between.clone().count() == found.len();
         for (index, frame) in between.enumerate() {
             // The line to a last frame that was moved begins where it was moved to.
             let next = |index: usize| match half == 0 && index == last {
-                true => beyond,
+                true => after_last,
                 false => found[index],
             };
-            smooth[frame] = match index == last && ends_beyond {
-                true => beyond,
+            smooth[frame] = match index == last && ends_after {
+                true => after_last,
                 false => (next(index) + next(index + 1)) / 2.0,
             };
         }
@@ -175,9 +175,9 @@ impl Accelerations {
         let weight = 0.25 * libm::sqrt(largest);
         let mut diagonal = vec![0.0; frames];
         let mut below = vec![[0.0; 2]; frames];
-        for column in 0..frames {
-            let mut pivot = bands[column][0] + weight;
-            let mut beside = bands[column][1];
+        for (column, [middle, first, second]) in bands.into_iter().enumerate() {
+            let mut pivot = middle + weight;
+            let mut beside = first;
             for back in 1..=2.min(column) {
                 let before = column - back;
                 let factor = below[before][back - 1] * diagonal[before];
@@ -187,7 +187,7 @@ impl Accelerations {
                 }
             }
             diagonal[column] = pivot;
-            below[column] = [beside / pivot, bands[column][2] / pivot];
+            below[column] = [beside / pivot, second / pivot];
         }
         Self {
             weight,
@@ -222,7 +222,12 @@ mod tests {
         let path = |frames: usize| -> Vec<DVec2> {
             let frames = (0..frames).map(|frame| frame as f64);
             frames
-                .map(|t| DVec2::new(0.05 * t + 0.1 * (0.7 * t).sin(), 0.2 * (0.4 * t).cos()))
+                .map(|t| {
+                    DVec2::new(
+                        0.05 * t + 0.1 * libm::sin(0.7 * t),
+                        0.2 * libm::cos(0.4 * t),
+                    )
+                })
                 .collect()
         };
         for (frames, frame, expected) in [
@@ -260,8 +265,8 @@ mod tests {
             assert!((speed - 3.0).abs() < 1e-12, "{speed}");
             assert_eq!(row[KIMODO_NUMBERS - 4..], [0.0, 1.0, 1.0, 1.0]);
         }
-        let few = kimodo(&frames[..4], &rotations[..4], 30.0).unwrap_err();
-        assert_eq!(few, KimodoError::FewFrames { frames: 4 });
+        let refused = kimodo(&frames[..4], &rotations[..4], 30.0).unwrap_err();
+        assert_eq!(refused, KimodoError::TooFewFrames { frames: 4 });
     }
 
     /// The factored matrix is that of accelerations.
@@ -270,7 +275,7 @@ mod tests {
         for frames in [3, 4, 5, 17] {
             let system = Accelerations::new(frames);
             let found: Vec<DVec2> = (0..frames)
-                .map(|index| DVec2::new((index as f64).sin(), 0.3 * index as f64))
+                .map(|index| DVec2::new(libm::sin(index as f64), 0.3 * index as f64))
                 .collect();
             let acceleration = |row: usize| match row == 0 || row + 1 == frames {
                 true => DVec2::ZERO,

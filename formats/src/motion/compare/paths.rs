@@ -432,8 +432,8 @@ mod tests {
         let (first, second) = ([0.0, 15.0, 30.0896], [0.0, 10.0, 20.0, end]);
         assert!(first[2] != end);
         let found = pairs(Associate::Interpolated, [&second, &first]);
-        assert_eq!((found.pairs.len(), found.outside), (4, 0));
-        assert_eq!(found.pairs[3], [end, 30.0896]);
+        assert_eq!((found.pairs.len(), found.outside), (2, 0));
+        assert_eq!(found.pairs[1], [end, 30.0896]);
         let found = pairs(Associate::Interpolated, [&first, &[0.0, 10.0, 20.0, 30.0]]);
         assert_eq!(found.outside, 1);
     }
