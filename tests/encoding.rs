@@ -56,11 +56,11 @@ fn rotation_vectors_are_the_axis_times_the_angle() {
     let mut all = vec![f32::NAN; 3000];
     engine.rotation_vectors_into(&rotations, &mut all).unwrap();
     for (found, &angle) in all.chunks_exact(3).zip(&angles) {
-        // f32 rounds w where the angle is near π.
+        // Quaternion and vector are rounded to f32.
         let distance = glam::Vec3::from_slice(found)
             .as_dvec3()
             .distance(axis * angle);
-        assert!(distance < 3e-7, "{angle} {found:?}");
+        assert!(distance < 6e-7, "{angle} {found:?}");
     }
     for count in [0, 1, 256, 257] {
         let mut some = vec![f32::NAN; 3 * count];

@@ -1,7 +1,6 @@
 //! Kimodo's motion: matrices and positions of all joints in the world, y up, without names, parents or a rate.
 
 use tumble::Layout;
-use tumble::names::counted;
 
 use super::{Axis, Dialect, member, missing};
 use crate::diagnostic::Code;
