@@ -265,10 +265,17 @@ impl RecordedPlan {
     /// results, files of shards are what an interrupted merge left.
     pub(crate) fn lost(folder: &Path) -> Option<String> {
         let path = Self::path(folder);
-        let shards = record::numbers(folder).len();
-        let is_lost = shards > 0 && !path.is_symlink() && !path.exists();
-        let is_merged = || std::fs::symlink_metadata(folder.join(NAME)).is_ok();
-        (is_lost && !is_merged()).then(|| {
+        let is_there = |path: &Path| std::fs::symlink_metadata(path).is_ok();
+        if is_there(&path) || is_there(&folder.join(NAME)) {
+            return None;
+        }
+        let is_of_shard = |&shard: &usize| {
+            let bytes = record::bytes(folder, shard);
+            bytes.is_ok_and(|bytes| record::header(&bytes).is_some())
+        };
+        let shards = record::numbers(folder).into_iter().filter(is_of_shard);
+        let shards = shards.count();
+        (shards > 0).then(|| {
             format!(
                 "{}: is missing, and there are files of {}; `tumble eval … --shard 1/1 --resume`, with the same \
                  inputs and options, writes it again and keeps the results that are complete",

@@ -219,7 +219,7 @@ mod tests {
             let apart = (*found - *expected).to_array();
             let apart = apart
                 .into_iter()
-                .fold(0.0, |most: f32, it| most.max(it.abs()));
+                .fold(0.0, |largest: f32, it| largest.max(it.abs()));
             assert!(apart < 0.01, "{found} {expected}");
         }
     }
