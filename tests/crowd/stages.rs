@@ -89,8 +89,8 @@ fn crowds(
     crowds
 }
 
-fn assert_bits(found: &[[f32; 4]], expected: &[[f32; 4]], what: &str) {
-    assert!(bits(found) == bits(expected), "{what}");
+fn assert_bits(found: &[[f32; 4]], expected: &[[f32; 4]], step: &str) {
+    assert!(bits(found) == bits(expected), "{step}");
 }
 
 fn record(crowd: &mut Crowd, commands: &Commands<'_>, targets: &[&CrowdTarget]) {
