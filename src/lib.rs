@@ -242,13 +242,13 @@ pub mod vulkan {
     pub use crate::shader::kernels;
     #[cfg(feature = "vulkan")]
     pub use crate::{
+        engine::clip::request::on_device::application_device::TimedTarget,
         gpu::clip::ClipTarget,
         gpu::crowd::CrowdTarget,
         gpu::external::ExportedResult,
         gpu::handles::{QueueLock, VulkanBuffer, VulkanHandles, VulkanQueue},
         gpu::passes::PassTarget,
         gpu::recorded::{CommandScopes, CommandUsers},
-        gpu::timed_clip::TimedTarget,
         pose::pass::{PassRequest, PosePass},
     };
 

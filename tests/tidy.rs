@@ -513,6 +513,7 @@ fn packages_have_all_that_they_include() {
                             "src",
                             "shaders",
                             "functions.wgsl",
+                            "docs/crowd.md",
                             "docs/library.md",
                             "docs/your-tests.md",
                             "README.md",

@@ -369,6 +369,36 @@ typedef uint32_t TumbleSampling;
 #endif // __cplusplus
 
 /*
+ Matrices of a crowd in a buffer that become those of a later stage, in place. The application may have changed
+ them before.
+ */
+enum TumbleCrowdStage
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+  /*
+   `TUMBLE_CROWD_VALUES_LOCAL` become `TUMBLE_CROWD_VALUES_MODEL`.
+   */
+  TUMBLE_CROWD_STAGE_LOCAL_TO_MODEL = 0,
+  /*
+   `TUMBLE_CROWD_VALUES_MODEL` become `TUMBLE_CROWD_VALUES_SKINNING`.
+   */
+  TUMBLE_CROWD_STAGE_MODEL_TO_SKINNING = 1,
+  /*
+   `TUMBLE_CROWD_VALUES_LOCAL` become `TUMBLE_CROWD_VALUES_SKINNING`.
+   */
+  TUMBLE_CROWD_STAGE_LOCAL_TO_SKINNING = 2,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum TumbleCrowdStage TumbleCrowdStage;
+#else
+typedef uint32_t TumbleCrowdStage;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/*
  The values that are stored for every joint of every visible instance, in the order `[instance][joint]`.
  */
 enum TumbleCrowdValues
@@ -488,8 +518,8 @@ typedef struct TumbleCrowd TumbleCrowd;
 typedef struct TumbleCrowdLibrary TumbleCrowdLibrary;
 
 /*
- A crowd target: everything that is needed to record evaluations of a crowd, and the range of the application's
- buffer that receives their results.
+ A crowd target: everything that is needed to record evaluations of a crowd, or a stage of them, and the range of the
+ application's buffer that receives their results.
  */
 typedef struct TumbleCrowdTarget TumbleCrowdTarget;
 
@@ -1769,8 +1799,8 @@ TumbleResult tumble_set_scales(struct TumbleSet *set,
 
  These calls submit to the queue: this one, `tumble_upload`, `tumble_evaluate`, `tumble_clip_evaluate`,
  `tumble_clip_evaluate_to_buffer`, `tumble_request_evaluate`, `tumble_clip_target_new`, `tumble_pass_to_buffer`,
- `tumble_pass_target_new`, `tumble_crowd_new`, `tumble_crowd_target_new`, `tumble_crowd_evaluate`,
- `tumble_crowd_evaluate_half` and `tumble_crowd_submit`.
+ `tumble_pass_target_new`, `tumble_crowd_new`, `tumble_crowd_target_new`, `tumble_crowd_stage_target_new`,
+ `tumble_crowd_evaluate`, `tumble_crowd_evaluate_half` and `tumble_crowd_submit`.
  All others do not. Without `lock_queue`, the application must not use the queue while one of them runs. The simplest
  solution is a queue that only the library uses, if the device has several. Any number of engines may be created on
  one queue: they take turns.
@@ -2339,11 +2369,32 @@ TumbleResult tumble_crowd_target_new(const struct TumbleCrowd *crowd,
                                      struct TumbleCrowdTarget **target);
 
 /*
- Records an evaluation at the clock's time into the application's command buffer `commands`, a `VkCommandBuffer`.
+ Prepares a stage that continues matrices in a range of the application's Vulkan buffer, in place, in 32 bits.
+
+ `stage` is a `TumbleCrowdStage`. A frame is then, for example: `tumble_crowd_record` with a target for
+ `TUMBLE_CROWD_VALUES_LOCAL` in this range, the application's own commands that change these matrices (inverse
+ kinematics), and `tumble_crowd_record` with the stage's target, which makes them skinning matrices. The stage
+ continues the matrices of as many instances as are visible when it is recorded, whatever wrote them. Results have the
+ bits of the CPU, if all numbers are finite and less than 2^36 in magnitude; where nothing was changed, they have the
+ bits of an evaluation without stages. The rest is as for `tumble_crowd_target_new`, also the errors.
+
+ # Safety
+ As for `tumble_crowd_target_new`.
+ */
+TumbleResult tumble_crowd_stage_target_new(const struct TumbleCrowd *crowd,
+                                           uint32_t stage,
+                                           uint64_t buffer,
+                                           uint64_t offset,
+                                           uint64_t size,
+                                           struct TumbleCrowdTarget **target);
+
+/*
+ Records an evaluation at the clock's time, or the stage of the target, into the application's command buffer
+ `commands`, a `VkCommandBuffer`.
 
  The commands write up to 20 bytes for each layer that changed since the last evaluation and 4 bytes for each
- instance of a new list of visible instances, and dispatch the kernels. If no instance is visible, nothing is
- recorded. Nothing is submitted, waited for or allocated. Barriers are included: the evaluation waits for all
+ instance of a new list of visible instances, and dispatch the kernels. A stage writes none of these changes; they
+ remain for the next evaluation. If no instance is visible, nothing is recorded. Nothing is submitted, waited for or allocated. Barriers are included: the evaluation waits for all
  commands that were recorded before it; commands that are recorded after it, or submitted to the same queue later,
  see the result.
 

@@ -25,7 +25,8 @@ use crate::version::*;
 /// Constants of C count the values of the engine's options.
 #[test]
 fn constants_count_the_options_of_the_engine() {
-    use tumble::{Ends, KeySigns, Quantity, Speed, WrapMode, crowd::CrowdValues};
+    use tumble::crowd::{CrowdStage, CrowdValues};
+    use tumble::{Ends, KeySigns, Quantity, Speed, WrapMode};
 
     #[track_caller]
     fn same<C: std::fmt::Debug, T: std::fmt::Debug>(constants: &[C], options: &[T]) {
@@ -92,6 +93,11 @@ fn constants_count_the_options_of_the_engine() {
     same(
         &[V::Rotations, V::Local, V::Model, V::Skinning],
         &CrowdValues::ALL,
+    );
+    use crate::crowd::target::TumbleCrowdStage as S;
+    same(
+        &[S::LocalToModel, S::ModelToSkinning, S::LocalToSkinning],
+        &CrowdStage::ALL,
     );
 }
 

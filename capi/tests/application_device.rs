@@ -328,6 +328,76 @@ fn frames_are_recorded_into_an_applications_commands() {
     done(tumble_engine_free(engine));
 }
 
+/// Commands that evaluate local matrices and continue them to model matrices: the bytes that the CPU gives.
+#[test]
+fn stages_are_recorded_into_an_applications_commands() {
+    if vulkan_devices().is_empty() {
+        return;
+    }
+    let application = Application::new();
+    let library = library();
+    let (mut engine, mut cpu) = (null_mut(), null_mut());
+    done(open(&handles(&application), &mut engine));
+    // SAFETY: text, null and room for the handle.
+    done(unsafe { tumble_engine_open(c"cpu".as_ptr(), null(), &raw mut cpu) });
+    let (recorded, expected) = (crowd(engine, library), crowd(cpu, library));
+    let (local, model) = (
+        TumbleCrowdValues::Local as u32,
+        TumbleCrowdValues::Model as u32,
+    );
+    go_on(recorded, 0);
+    go_on(expected, 0);
+    let expected_bits = evaluated(expected, model, false);
+    let size = expected_bits.len() as u64;
+    let (buffer, memory) = application.buffer(size);
+    let [mut evaluation, mut stage] = [null_mut(); 2];
+    done(target(
+        recorded,
+        (local, false),
+        buffer,
+        (0, size),
+        &mut evaluation,
+    ));
+    let stage_target = |stage: u32, size: u64, made: &mut *mut TumbleCrowdTarget| {
+        let buffer = buffer.as_raw();
+        // SAFETY: as for `target`.
+        unsafe { tumble_crowd_stage_target_new(recorded, stage, buffer, 0, size, made) }
+    };
+    let argument = TumbleResult::InvalidArgument;
+    fails(stage_target(3, size, &mut stage), argument, "`stage` is 3");
+    let wrong = TumbleResult::WrongSize;
+    fails(stage_target(0, size - 1, &mut stage), wrong, "does not fit");
+    let state = TumbleResult::WrongState;
+    let skinning = TumbleCrowdStage::LocalToSkinning as u32;
+    let unbound = stage_target(skinning, size, &mut stage);
+    fails(unbound, state, "no inverse bind matrices");
+    let to_model = TumbleCrowdStage::LocalToModel as u32;
+    done(stage_target(to_model, size, &mut stage));
+    let commands = Commands::new(&application);
+    let frame = commands.recorded(|commands| {
+        for target in [evaluation, stage] {
+            // SAFETY: the commands are in recording, and submitted below.
+            done(unsafe { tumble_crowd_record(recorded, target, pointer(commands)) });
+        }
+    });
+    commands.run(&[frame]);
+    assert!(application.bytes(memory, size) == expected_bits);
+    for target in [evaluation, stage] {
+        done(free_target(target));
+    }
+    for crowd in [recorded, expected] {
+        done(tumble_crowd_free(crowd));
+    }
+    done(tumble_crowd_library_free(library));
+    done(tumble_engine_free(cpu));
+    done(tumble_engine_free(engine));
+    // SAFETY: nothing is in flight.
+    unsafe {
+        application.device.destroy_buffer(buffer, None);
+        application.device.free_memory(memory, None);
+    }
+}
+
 /// A clip's rotations stay on the device.
 #[test]
 fn clips_are_evaluated_into_an_applications_buffer() {

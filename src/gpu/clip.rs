@@ -147,13 +147,13 @@ impl MachineClip for VulkanClip {
 }
 
 /// A range of an application's buffer for results of one size.
-pub(super) struct ResultRange {
-    pub(super) encoding: Encoding,
+pub(crate) struct ResultRange {
+    pub(crate) encoding: Encoding,
     buffer: VulkanBuffer,
     /// The offset at which the buffer is bound, bytes.
     bound: u64,
     /// The length of a result, bytes.
-    pub(super) bytes: u64,
+    pub(crate) bytes: u64,
 }
 
 impl ResultRange {

@@ -32,7 +32,7 @@
 //!
 //! Sets with fewer samples than keys are evaluated by [`engine::from_keys`] without segments. Crowds have separate
 //! tables and targets ([`crowd`]), and so have states of motion libraries ([`motion`]). A [`ClipTarget`](clip::ClipTarget) records a clip into an application's commands,
-//! and a [`TimedTarget`](timed_clip::TimedTarget) at times that are known only then;
+//! and a [`TimedClip`](timed_clip::TimedClip) at times that are known only then;
 //! [`passes`] runs passes over poses, or records them from buffer to buffer.
 //!
 //! # Memory

@@ -25,9 +25,8 @@ const DISTANCES: usize = 1;
 
 const LIST: &str = "the list of samples";
 
-/// Samples of a clip, prepared for recording into an application's commands, each time at other times
-/// ([`Request::timed_target`](crate::engine::clip::request::Request::timed_target)).
-pub struct TimedTarget {
+/// Samples of a clip, prepared for recording into an application's commands, each time at other times.
+pub(crate) struct TimedClip {
     engine: Arc<VulkanEngine>,
     clip: Arc<ClipData>,
     window: Window,
@@ -74,7 +73,7 @@ impl<'r> ListRoom<'r> for &'r mut HostLists {
     }
 }
 
-impl TimedTarget {
+impl TimedClip {
     pub(crate) fn new(
         engine: &Arc<VulkanEngine>,
         job: Job<'_>,
@@ -83,9 +82,9 @@ impl TimedTarget {
         buffer: VulkanBuffer,
     ) -> Result<Self, EvaluateError> {
         let range = ResultRange::new(engine, job.encoding, buffer, window.len())?;
-        let most = 2 * window.len().max(1) as u64;
+        let capacity = 2 * window.len().max(1) as u64;
         let new = |name, each: usize| {
-            let size = most * each as u64;
+            let size = capacity * each as u64;
             (engine.device.physical).check_range(LIST, size)?;
             Buffer::new(&engine.device, name, size, Residence::Device)
         };
@@ -124,10 +123,9 @@ impl TimedTarget {
         })
     }
 
-    /// The length of a result, bytes.
-    #[must_use]
-    pub fn bytes(&self) -> u64 {
-        self.range.bytes
+    /// The range of the results.
+    pub(crate) fn range(&self) -> &ResultRange {
+        &self.range
     }
 
     /// The device that the commands are recorded for.
@@ -201,14 +199,5 @@ impl TimedTarget {
         recording.publish();
         recorded.record(commands, &inputs);
         Ok(())
-    }
-}
-
-impl std::fmt::Debug for TimedTarget {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("TimedTarget")
-            .field("encoding", &self.range.encoding)
-            .field("bytes", &self.range.bytes)
-            .finish_non_exhaustive()
     }
 }

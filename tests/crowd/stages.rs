@@ -2,9 +2,9 @@
 #![allow(unsafe_code)] // the device, the buffers and the commands are the application's
 
 use tumble::crowd::{Crowd, CrowdError, CrowdLibrary, CrowdStage, CrowdValues};
-use tumble::method;
 use tumble::vulkan::tuning::Mapping;
 use tumble::vulkan::{CommandScopes, CommandUsers, CrowdTarget, VulkanBuffer};
+use tumble::{Engine, EngineOptions, method};
 
 use super::visible::some;
 use super::{bits, cpu, evaluated, layer, library, skeleton};
@@ -70,13 +70,13 @@ fn change(random: &mut Random, rows: &mut [[f32; 4]]) {
 /// A crowd on an application's device, and the same one on the CPU.
 fn crowds(
     random: &mut Random,
-    (application, mapping): (&Application, Mapping),
+    engine: Engine,
     library: &CrowdLibrary,
     instances: usize,
 ) -> [Crowd; 2] {
     let layers = 1 + instances % 2;
-    let engines = [application.engine(mapping), cpu()];
-    let mut crowds = engines.map(|engine| engine.crowd(library, instances, layers).unwrap());
+    let mut crowds =
+        [engine, cpu()].map(|engine| engine.crowd(library, instances, layers).unwrap());
     for slot in 0..layers * instances {
         let plays = layer(random, library);
         for crowd in &mut crowds {
@@ -89,8 +89,8 @@ fn crowds(
     crowds
 }
 
-fn assert_bits(found: &[[f32; 4]], expected: &[[f32; 4]], what: &str) {
-    assert!(bits(found) == bits(expected), "{what}");
+fn assert_bits(found: &[[f32; 4]], expected: &[[f32; 4]], step: &str) {
+    assert!(bits(found) == bits(expected), "{step}");
 }
 
 fn record(crowd: &mut Crowd, commands: &Commands<'_>, targets: &[&CrowdTarget]) {
@@ -114,12 +114,17 @@ fn stages_continue_what_the_application_has_changed() {
         for (mapping, joints, instances) in [
             (Mapping::Samples, 21, 34),
             (Mapping::Samples, 130, 5),
-            (Mapping::Runs, 90, 1930),
+            (Mapping::Runs, 40, 300),
         ] {
             let mut random = Random(joints as u64);
             let library = library(&mut random, joints, &[method::SLERP]);
-            let on = (&application, mapping);
-            let [mut crowd, mut expected] = crowds(&mut random, on, &library, instances);
+            // Windows of 256 instances of 40 joints.
+            let mut options = EngineOptions::default();
+            (options.memory, options.mapping) = (Some(1 << 20), mapping);
+            // SAFETY: the handles belong together and outlive the engine.
+            let engine = unsafe { Engine::from_vulkan(application.handles(), &options) };
+            let engine = engine.unwrap();
+            let [mut crowd, mut expected] = crowds(&mut random, engine, &library, instances);
             assert_stages(&application, &mut random, &mut crowd, &mut expected);
         }
     }
@@ -198,8 +203,8 @@ fn stages_continue_visible_instances_alone() {
     let application = Application::new();
     let mut random = Random(3);
     let library = library(&mut random, 9, &[method::SLERP]);
-    let on = (&application, Mapping::Automatic);
-    let [mut crowd, mut expected] = crowds(&mut random, on, &library, 50);
+    let engine = application.engine(Mapping::Automatic);
+    let [mut crowd, mut expected] = crowds(&mut random, engine, &library, 50);
     let matrices = Matrices::new(&application, 27 * 50);
     let commands = Commands::new(&application);
     let local = matrices.target(&crowd, CrowdValues::Local);

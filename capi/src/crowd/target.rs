@@ -2,17 +2,31 @@
 
 use std::ffi::c_void;
 
+use tumble::crowd::CrowdStage;
 use tumble::vulkan::CrowdTarget;
 
-use crate::arguments::{Out, flag, vulkan};
+use crate::arguments::{Out, flag, option, vulkan};
 use crate::crowd::output;
 use crate::crowd::player::TumbleCrowd;
 use crate::handle::{self, Object};
 use crate::result::{TumbleResult, code};
 use crate::vulkan::buffer_range;
 
-/// A crowd target: everything that is needed to record evaluations of a crowd, and the range of the application's
-/// buffer that receives their results.
+/// Matrices of a crowd in a buffer that become those of a later stage, in place. The application may have changed
+/// them before.
+#[repr(u32)]
+#[derive(Debug, Clone, Copy)]
+pub enum TumbleCrowdStage {
+    /// `TUMBLE_CROWD_VALUES_LOCAL` become `TUMBLE_CROWD_VALUES_MODEL`.
+    LocalToModel = 0,
+    /// `TUMBLE_CROWD_VALUES_MODEL` become `TUMBLE_CROWD_VALUES_SKINNING`.
+    ModelToSkinning = 1,
+    /// `TUMBLE_CROWD_VALUES_LOCAL` become `TUMBLE_CROWD_VALUES_SKINNING`.
+    LocalToSkinning = 2,
+}
+
+/// A crowd target: everything that is needed to record evaluations of a crowd, or a stage of them, and the range of the
+/// application's buffer that receives their results.
 pub struct TumbleCrowdTarget {
     inner: CrowdTarget,
 }
@@ -65,11 +79,45 @@ pub unsafe extern "C" fn tumble_crowd_target_new(
     })
 }
 
-/// Records an evaluation at the clock's time into the application's command buffer `commands`, a `VkCommandBuffer`.
+/// Prepares a stage that continues matrices in a range of the application's Vulkan buffer, in place, in 32 bits.
+///
+/// `stage` is a `TumbleCrowdStage`. A frame is then, for example: `tumble_crowd_record` with a target for
+/// `TUMBLE_CROWD_VALUES_LOCAL` in this range, the application's own commands that change these matrices (inverse
+/// kinematics), and `tumble_crowd_record` with the stage's target, which makes them skinning matrices. The stage
+/// continues the matrices of as many instances as are visible when it is recorded, whatever wrote them. Results have the
+/// bits of the CPU, if all numbers are finite and less than 2^36 in magnitude; where nothing was changed, they have the
+/// bits of an evaluation without stages. The rest is as for `tumble_crowd_target_new`, also the errors.
+///
+/// # Safety
+/// As for `tumble_crowd_target_new`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn tumble_crowd_stage_target_new(
+    crowd: *const TumbleCrowd,
+    stage: u32,
+    buffer: u64,
+    offset: u64,
+    size: u64,
+    target: *mut *mut TumbleCrowdTarget,
+) -> TumbleResult {
+    code(|| {
+        let out = Out::new(target, "target")?;
+        let crowd = handle::get(crowd)?;
+        let stage = option(stage, &CrowdStage::ALL, "stage")?;
+        let buffer = buffer_range(crowd.is_on_application_device, buffer, offset, size)?;
+        // SAFETY: as the caller promises.
+        let inner = unsafe { crowd.lock()?.inner.stage_target(stage, buffer)? };
+        // SAFETY: as the caller promises.
+        unsafe { out.set(handle::give(TumbleCrowdTarget { inner })) };
+        Ok(())
+    })
+}
+
+/// Records an evaluation at the clock's time, or the stage of the target, into the application's command buffer
+/// `commands`, a `VkCommandBuffer`.
 ///
 /// The commands write up to 20 bytes for each layer that changed since the last evaluation and 4 bytes for each
-/// instance of a new list of visible instances, and dispatch the kernels. If no instance is visible, nothing is
-/// recorded. Nothing is submitted, waited for or allocated. Barriers are included: the evaluation waits for all
+/// instance of a new list of visible instances, and dispatch the kernels. A stage writes none of these changes; they
+/// remain for the next evaluation. If no instance is visible, nothing is recorded. Nothing is submitted, waited for or allocated. Barriers are included: the evaluation waits for all
 /// commands that were recorded before it; commands that are recorded after it, or submitted to the same queue later,
 /// see the result.
 ///

@@ -299,12 +299,19 @@ fn targets_need_the_applications_device() {
         let crowd = c_crowd(engine, library, (1, 1));
         let mut target = null_mut();
         // SAFETY: room for the handle; the buffer is refused.
-        let made = unsafe { tumble_crowd_target_new(crowd, 2, 0, 1, 0, 1 << 20, &raw mut target) };
-        fails(
-            made,
-            TumbleResult::InvalidArgument,
-            "tumble_engine_from_vulkan",
-        );
+        let refused = unsafe {
+            [
+                tumble_crowd_target_new(crowd, 2, 0, 1, 0, 1 << 20, &raw mut target),
+                tumble_crowd_stage_target_new(crowd, 0, 1, 0, 1 << 20, &raw mut target),
+            ]
+        };
+        for made in refused {
+            fails(
+                made,
+                TumbleResult::InvalidArgument,
+                "tumble_engine_from_vulkan",
+            );
+        }
         done(tumble_crowd_free(crowd));
         done(tumble_engine_free(engine));
     }

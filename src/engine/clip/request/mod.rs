@@ -1,7 +1,7 @@
 //! A request: which samples of a clip or of a set are evaluated, in which layout and encoding, and into which memory.
 
 #[cfg(feature = "vulkan")]
-mod on_device;
+pub(crate) mod on_device;
 
 use std::ops::Range;
 use std::sync::Arc;

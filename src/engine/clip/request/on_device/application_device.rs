@@ -14,7 +14,7 @@ use crate::gpu::engine::VulkanEngine;
 use crate::gpu::handles::VulkanBuffer;
 use crate::gpu::job::Job;
 use crate::gpu::recorded::{CommandScopes, Commands};
-use crate::gpu::timed_clip::TimedTarget;
+use crate::gpu::timed_clip::TimedClip;
 use crate::machine::MachineClip as _;
 use crate::machine::error::VulkanError;
 use crate::output::window::Window;
@@ -93,7 +93,7 @@ impl Request<'_> {
         let samples = 0..part.window.samples.len();
         let window = Window::of(part.window.tracks.clone(), samples, self.layout);
         let target = |_: &VulkanEngine, job: Job<'_>| {
-            TimedTarget::new(
+            TimedClip::new(
                 &engine,
                 job,
                 Arc::clone(clip.data()),
@@ -101,7 +101,8 @@ impl Request<'_> {
                 buffer,
             )
         };
-        Ok(clip.on_device(&part.timeline, self.encoding, target)?)
+        let clip = clip.on_device(&part.timeline, self.encoding, target)?;
+        Ok(TimedTarget { clip })
     }
 
     /// The device and the part of the result, if the result fits the range of the buffer.
@@ -129,7 +130,38 @@ impl Request<'_> {
     }
 }
 
+/// Samples of a clip, prepared for recording into an application's commands, each time at other times
+/// ([`Request::timed_target`]).
+///
+/// ```
+/// use tumble::ash::vk;
+/// use tumble::vulkan::{TimedTarget, VulkanBuffer};
+/// use tumble::{Clip, Error, SampleTimes};
+///
+/// /// # Safety
+/// /// As for `Request::timed_target`.
+/// unsafe fn target(clip: &Clip, pose: VulkanBuffer) -> Result<TimedTarget, Error> {
+///     let one_sample = SampleTimes::at(vec![0.0]); // of each track
+///     unsafe { clip.request(&one_sample).timed_target(pose) }
+/// }
+///
+/// /// # Safety
+/// /// As for `TimedTarget::record`.
+/// unsafe fn frame(target: &TimedTarget, commands: vk::CommandBuffer, seconds: f64) -> Result<(), Error> {
+///     unsafe { target.record(commands, 0, &[seconds]) }
+/// }
+/// ```
+pub struct TimedTarget {
+    clip: TimedClip,
+}
+
 impl TimedTarget {
+    /// The length of a result, bytes.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        self.clip.range().bytes
+    }
+
     /// Records an evaluation at these times, seconds, into the application's command buffer: as many as the request has
     /// samples, the same for all tracks. The result starts `offset` bytes after the start of the target's range. It has
     /// the bits of an evaluation at [`SampleTimes::at`](crate::SampleTimes::at) these times.
@@ -171,8 +203,17 @@ impl TimedTarget {
         scopes: CommandScopes,
     ) -> Result<(), Error> {
         // SAFETY: promised by the caller.
-        let commands = unsafe { Commands::new(&self.engine().device, commands) };
+        let commands = unsafe { Commands::new(&self.clip.engine().device, commands) };
         let commands = commands.between(scopes.with_earlier_recordings());
-        Ok(self.record_at(commands, offset, times)?)
+        Ok(self.clip.record_at(commands, offset, times)?)
+    }
+}
+
+impl std::fmt::Debug for TimedTarget {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("TimedTarget")
+            .field("encoding", &self.clip.range().encoding)
+            .field("bytes", &self.bytes())
+            .finish_non_exhaustive()
     }
 }

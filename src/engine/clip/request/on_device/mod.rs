@@ -1,6 +1,6 @@
 //! Results that stay on a Vulkan device: in an application's buffer, or in memory that other interfaces import.
 
-mod application_device;
+pub(crate) mod application_device;
 mod exported;
 
 use crate::engine::Engine;
