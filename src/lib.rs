@@ -1,4 +1,5 @@
-//! Bulk interpolation of rotation keyframes, with the same bits on every Vulkan driver and on the CPU.
+//! Bulk interpolation of rotation keyframes, with the same bits on the CPU and on every Vulkan device that passes the
+//! self-test.
 //!
 //! From keyframe tracks, an engine evaluates the rotation of every track at every frame:
 //!

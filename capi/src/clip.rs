@@ -150,7 +150,7 @@ pub unsafe extern "C" fn tumble_upload(
 }
 
 /// Returns the memory that a clip takes on the host for each key, in bytes: 16 or more if the clip keeps its keys; if
-/// the clip keeps segments, 64 or more for arcs (slerp), and 144 to 208 or more for polynomials. On the CPU, a clip
+/// the clip keeps segments, at least 64 for arcs (slerp), at least 144 for polynomials. On the CPU, a clip
 /// whose segments would exceed the limit `memory` of `TumbleEngineOptions` keeps its keys instead, if samples can be
 /// computed from them.
 ///

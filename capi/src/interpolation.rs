@@ -114,7 +114,7 @@ pub struct TumbleInterpolation {
     /// is 0, with -1 it is doubled.
     pub tension: f64,
     /// The continuity of "kochanek-bartels", likewise. With -1 the curve has a corner at a key; with 1 the corner
-    /// points the other way, because the curve swings out beyond the key before and after it.
+    /// points the other way, because the curve overshoots on both sides of the key.
     pub continuity: f64,
     /// The bias of "kochanek-bartels", likewise. With 1 the tangent at a key follows the interval before it, with -1
     /// the interval after it.

@@ -26,8 +26,8 @@ pub enum TumblePassOperation {
     Mix = 1,
     /// The first input, and the weighted difference of the second from `reference`, with one weight, 0 to 1.
     Add = 2,
-    /// Rotations and positions in the world, from one input, the rotations in the parents' frames, and a skeleton. No
-    /// weight; the layout must be `TUMBLE_LAYOUT_FRAME_MAJOR`.
+    /// Rotations and positions in the world, of the skeleton `parents` and `offsets`. The one input is the rotations in
+    /// the parents' frames. No weight; the layout must be `TUMBLE_LAYOUT_FRAME_MAJOR`.
     World = 3,
 }
 
@@ -256,7 +256,7 @@ impl Object for TumblePassTarget {
 /// Prepares the recording of a pass, whose result goes to a range of the application's Vulkan buffer.
 ///
 /// The kernel is compiled and memory is allocated here, not when a frame is recorded. If the kernel was not checked
-/// before, this call checks it, and then submits to the engine's queue. The buffers must be as `tumble_pass_to_buffer`
+/// before, this call checks it; only then it submits to the engine's queue. The buffers must be as `tumble_pass_to_buffer`
 /// says. The target does not need the engine afterwards. The application frees the target with
 /// `tumble_pass_target_free` before it destroys a buffer or the device.
 ///

@@ -60,8 +60,8 @@ pub struct TumbleVulkan {
     /// made with it are freed.
     pub queue_user: *mut c_void,
     /// The application's `VkPipelineCache`, in which the library makes its pipelines, or 0 (`VK_NULL_HANDLE`). It must
-    /// not be synchronized externally, and must stay valid until the engine and all objects that were made with it are
-    /// freed. The library neither reads this cache from a file nor writes it to one. 0: the library makes a cache and
+    /// have been created without `VK_PIPELINE_CACHE_CREATE_EXTERNALLY_SYNCHRONIZED_BIT`, and must stay valid until the
+    /// engine and all objects that were made with it are freed. The library neither reads this cache from a file nor writes it to one. 0: the library makes a cache and
     /// keeps it in a file (`TumbleEngineOptions.cache_directory`).
     pub pipeline_cache: u64,
 }
@@ -218,8 +218,8 @@ pub(crate) fn buffer_range(
 ///
 /// # Errors
 /// - `TUMBLE_RESULT_INVALID_POINTER` if a required handle or function is null.
-/// - `TUMBLE_RESULT_INVALID_ARGUMENT` if the version is below 1.1 or above the loader's, or the physical device or a
-///   queue family does not fit.
+/// - `TUMBLE_RESULT_INVALID_ARGUMENT` if the version is below 1.1, or the physical device or a queue family does not
+///   fit.
 /// - `TUMBLE_RESULT_DEVICE` if the device fails the self-test.
 ///
 /// # Safety

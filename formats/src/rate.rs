@@ -216,7 +216,7 @@ const UNNOTICED: f64 = 5e-3;
 /// The largest change of a duration that few digits may cause.
 const MAX_CHANGE: f64 = 0.025;
 
-/// By which part a clip becomes longer if its frame time is read as that of a rate; `None` if it is hardly noticed.
+/// The fraction by which a clip becomes longer if its frame time is read as that of a rate; `None` if it is hardly noticed.
 pub(crate) fn noticed_change(period: f64, rate: FrameRate) -> Option<f64> {
     let change = rate.time_of(1) / period - 1.0;
     (change.abs() > UNNOTICED).then_some(change)
@@ -644,7 +644,7 @@ fn on_common_grid(windows: &[TimeWindow]) -> Option<FrameRate> {
     on_one_of(windows, common.map(|&rate| (rate, 1)))
 }
 
-/// The first of some rates such that all times are frames of it, unless this may be an accident.
+/// The first of some rates at whose frames all times are, unless this may be a coincidence.
 fn on_one_of(
     windows: &[TimeWindow],
     rates: impl Iterator<Item = (u64, u64)> + Clone,

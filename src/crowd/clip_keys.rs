@@ -1,7 +1,7 @@
 //! Curves of motion tables that are kept as their keys, where these determine them: the arcs of slerp and straight
 //! lines. What a sample needs of them is computed when it is taken, so that a key takes 16 bytes instead of 48 for
-//! rotations, 16 instead of 80 for translations, and 8 if rotations are packed. Of the kernels those over states alone read
-//! these forms (`shaders/motion/joints.wgsl`, with `shaders/motion/packed.wgsl`); a crowd's do not.
+//! rotations, 16 instead of 80 for translations, and 8 if rotations are packed. Only the kernels for
+//! states of motion read these forms (`shaders/motion/joints.wgsl`, with `shaders/motion/packed.wgsl`).
 
 use glam::Vec4;
 

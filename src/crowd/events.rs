@@ -33,8 +33,8 @@ pub struct PassedEvent {
 
 /// The times at which a layer passes one tick of its clip: once, or once in each round.
 ///
-/// The layer's position counts in 2^-16 ticks and grows linearly with the clock, without wrapping. Backwards, position and
-/// tick are those of the mirrored axis, so that it grows, too.
+/// The layer's position counts in 2^-16 ticks and grows linearly with the clock, without wrapping. If the
+/// layer plays backwards, position and tick are counted on the reversed axis, so that the position grows then, too.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Passages {
     /// The position at the time 0 of the clock.

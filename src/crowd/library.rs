@@ -180,7 +180,7 @@ impl CrowdLibrary {
     /// clip, for additive layers, is its pose at its start ([`CrowdLibrary::set_reference`]).
     ///
     /// # Errors
-    /// * When the set has not one track for each joint, or a track has the name of no joint.
+    /// * When the set does not have exactly one track for each joint, or a track has the name of no joint.
     /// * When a track cannot be interpolated as requested, or the interpolation computes velocities or accelerations.
     /// * When a curve rotates so fast that no polynomial fits it.
     /// * When the clip has too many ticks, or the library is full.
@@ -314,7 +314,7 @@ impl CrowdLibrary {
     /// layers are multiplied.
     ///
     /// # Errors
-    /// When there is not one weight for each joint, a weight is outside 0 to 1, or the library has 31 masks already.
+    /// When the number of weights is not the number of joints, a weight is outside 0 to 1, or the library has 31 masks already.
     pub fn push_mask(&mut self, weights: &[f32]) -> Result<usize, CrowdError> {
         let mask = self.mask_count();
         self.check_joints("weights", weights.len())?;
@@ -359,7 +359,7 @@ impl CrowdLibrary {
     /// ```
     ///
     /// # Errors
-    /// When `poses` are no whole number of instances.
+    /// When `poses` is not a whole number of instances.
     pub fn local_to_model(&self, poses: &mut [[f32; 4]]) -> Result<(), CrowdError> {
         for pose in self.poses(poses)? {
             stages::walk(&self.links, pose.as_chunks_mut().0);
@@ -371,7 +371,7 @@ impl CrowdLibrary {
     /// [`CrowdValues::Skinning`](crate::crowd::CrowdValues::Skinning), in place, as [`CrowdLibrary::local_to_model`].
     ///
     /// # Errors
-    /// When `poses` are no whole number of instances, or the library has no inverse bind matrices.
+    /// When `poses` is not a whole number of instances, or the library has no inverse bind matrices.
     pub fn model_to_skinning(&self, poses: &mut [[f32; 4]]) -> Result<(), CrowdError> {
         if self.bind.is_empty() {
             return Err(CrowdError::NoInverseBind);

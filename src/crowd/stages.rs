@@ -1,5 +1,5 @@
-//! The stages after the transforms in the parents' frames, in place: along the skeleton to the model's frame, and to
-//! matrices for skinning.
+//! The last steps of an evaluation, in place: matrices relative to the parents become model matrices, and these become
+//! skinning matrices.
 
 use crate::shader::CrowdLink;
 use crate::twin::crowd_matrices::{Rows, affine_product};

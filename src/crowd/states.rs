@@ -784,7 +784,7 @@ impl Joint {
         self.angular_velocity = sum(parent.angular_velocity, relative).map(canonical);
     }
 
-    /// Sets the velocities to differences between two states, so many of which are in a second.
+    /// Sets the velocities to the difference of two states, divided by the time between them, `1 / per_second`.
     #[inline(always)]
     fn differ(&mut self, before: &Self, after: &Self, per_second: f32) {
         let [x, y, z] = before.position.map(|coordinate| -coordinate);

@@ -196,7 +196,7 @@ struct Group {
     uploaded: Uploaded,
 }
 
-/// How the part of a group is evaluated that is in a window.
+/// How the part of a group that is in a window is evaluated.
 struct GroupWork<'g> {
     group: &'g Group,
     source: WorkSource<'g>,
@@ -267,7 +267,7 @@ impl GroupedTracks {
             .collect()
     }
 
-    /// How each group is evaluated that has tracks in a window; with `chunk`, as a stream in chunks of so many values.
+    /// How each group that has tracks in a window is evaluated; with `chunk`, as a stream in chunks of so many values.
     fn works<'g>(
         &'g self,
         engine: &Engine,

@@ -242,7 +242,8 @@ impl Engine {
         self.machine.take_timings()
     }
 
-    /// Prepares a set for an interpolation, or for [one of each track](PerTrack), and stores it on the device as a clip.
+    /// Prepares a set for one interpolation of all tracks, or for [one for each](PerTrack), and stores it on the device as
+    /// a clip.
     ///
     /// On the CPU, a clip whose segments would exceed [`EngineOptions::kept_segments`] or [`EngineOptions::memory`]
     /// keeps its keys instead, if samples can be computed from them ([`Clip::bytes_per_key`]). If the prepared tracks
@@ -270,8 +271,8 @@ impl Engine {
         Ok(Clip::new(self.clone(), uploaded, keys))
     }
 
-    /// Starts a request for the samples of a set at these times, by an interpolation, or by [one of each
-    /// track](PerTrack). The set need not be uploaded.
+    /// Starts a request for the samples of a set at these times, by one interpolation for all tracks, or by [one for
+    /// each](PerTrack). The set need not be uploaded.
     ///
     /// By default the result has all tracks, track by track, with four f32 per value. Only the segments that the
     /// samples need are prepared. On a Vulkan device a set larger than its memory (or than [`EngineOptions::memory`])

@@ -100,7 +100,7 @@ impl Engine {
         self.in_tasks(rotations, output, VECTOR_NUMBERS, task)
     }
 
-    /// Does a task for parts of rotations and their results, which have a number of `numbers` each, on the engine's threads.
+    /// Runs a task for each part of the rotations, on the engine's threads. The result of a rotation has `numbers` numbers.
     fn in_tasks(
         &self,
         rotations: &[[f32; 4]],

@@ -41,8 +41,8 @@ pub(crate) fn prepare(
 pub(crate) enum Uploaded {
     /// Prepared for any timeline.
     Prepared(Box<dyn MachineClip>),
-    /// Keys from which samples are computed: in much less memory than segments, which come from memory too where they
-    /// are many.
+    /// Keys from which samples are computed. They take much less memory than segments; many segments would have to be
+    /// loaded from memory as well.
     Keys(Arc<KeptKeys>),
     /// A set that every evaluation prepares anew, because its segments exceed the engine's memory limit.
     Unprepared(Box<UnpreparedSet>),

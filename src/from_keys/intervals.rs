@@ -73,7 +73,7 @@ impl IntervalPlan {
         (1..MIN_LANES).contains(&self.lane_count) || self.curve == KeyCurve::TwoKeys
     }
 
-    /// Finds the intervals with these samples of a frame plan with this number, unless they are found already.
+    /// Finds the intervals that contain these samples of the frame plan with this number, unless they are found already.
     /// `weights` are those of all keys.
     pub(crate) fn find(
         &mut self,

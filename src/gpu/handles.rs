@@ -47,17 +47,18 @@ pub struct VulkanHandles {
     /// The application must not call the engine while it holds the lock, because the engine would wait forever. Without
     /// a lock, the application must not use the queue during a call of the engine that submits. These calls submit:
     /// [`Engine::from_vulkan`](crate::engine::Engine::from_vulkan) and [`Engine::warm`](crate::engine::Engine::warm),
-    /// uploads, all evaluations and streams, the functions called `to_buffer` and `target`,
-    /// [`Engine::crowd`](crate::engine::Engine::crowd), and a crowd's `submit`. Functions called `record` and those
-    /// that change a crowd's library or layers do not, and neither does dropping an object.
+    /// uploads, all evaluations and streams, the checks of kernels, the functions called `to_buffer`, `target`,
+    /// `timed_target` and `stage_target`, [`Engine::crowd`](crate::engine::Engine::crowd), and a crowd's `submit`.
+    /// Functions called `record` and those that change a crowd's library or layers do not, and neither does dropping an
+    /// object.
     ///
     /// Engines need no lock among themselves: all engines of a process that use one queue take turns. If several
     /// engines use a queue together with the application, give the same lock to each. The copy queue is for engines
     /// alone.
     pub queue_lock: Option<QueueLock>,
-    /// The application's pipeline cache, in which the engine makes its pipelines. It must outlive the engine, must not
-    /// be synchronized externally, and is neither read from nor written to a file by the engine. `None`: the engine
-    /// makes a cache, and keeps it in a file ([`EngineOptions::cache_files`](crate::machine::options::EngineOptions)).
+    /// The application's pipeline cache, in which the engine makes its pipelines. It must outlive the engine, and must
+    /// have been created without `VK_PIPELINE_CACHE_CREATE_EXTERNALLY_SYNCHRONIZED_BIT`. The engine neither reads it from
+    /// a file nor writes it to one. `None`: the engine makes a cache, and keeps it in a file ([`EngineOptions::cache_files`](crate::machine::options::EngineOptions)).
     pub pipeline_cache: Option<vk::PipelineCache>,
 }
 
@@ -80,8 +81,8 @@ impl fmt::Debug for VulkanHandles {
 }
 
 impl VulkanHandles {
-    /// An instance, which was made for a Vulkan version (`VkApplicationInfo::apiVersion`), a device of it and a queue,
-    /// without optional features.
+    /// Handles of an instance, of a device and of a queue, without optional features. `api_version` is the Vulkan version
+    /// for which the instance was made (`VkApplicationInfo::apiVersion`).
     #[must_use]
     pub fn new(
         entry: ash::Entry,
@@ -107,7 +108,7 @@ impl VulkanHandles {
         }
     }
 
-    /// `VK_KHR_shader_float_controls` is enabled on the device.
+    /// States that the application has enabled `VK_KHR_shader_float_controls` on the device.
     #[must_use]
     pub fn with_shader_float_controls(self) -> Self {
         Self {
@@ -116,7 +117,7 @@ impl VulkanHandles {
         }
     }
 
-    /// The feature `shaderInt64` is enabled on the device.
+    /// States that the application has enabled the feature `shaderInt64` on the device.
     #[must_use]
     pub fn with_shader_int64(self) -> Self {
         Self {
@@ -154,8 +155,8 @@ impl VulkanHandles {
 }
 
 /// The version of an instance that was made for the version `stated`, by a loader of the version `loader`; `None` if it
-/// is older than 1.1. An application may state a newer version than its loader's, which then counts: Vulkan has no
-/// query for the version of an instance, so that a mistake cannot be told from this.
+/// is older than 1.1. If an application states a newer version than its loader has, the loader's counts. Vulkan has no query
+/// for the version of an instance, so a mistake cannot be detected.
 fn usable_version(stated: u32, loader: u32) -> Option<u32> {
     let is_vulkan = vk::api_version_variant(stated) == 0; // another variant is another interface, such as Vulkan SC
     (is_vulkan && stated >= vk::API_VERSION_1_1).then_some(stated.min(loader))

@@ -308,7 +308,7 @@ impl PassTarget {
         unsafe { self.record_between(commands, CommandScopes::default()) };
     }
 
-    /// As [`PassTarget::record`], with barriers for some users alone of the poses and of the result's memory. Earlier
+    /// As [`PassTarget::record`], with barriers only for the named users of the poses and of the result's memory. Earlier
     /// recordings of the target are waited for in any case.
     ///
     /// # Safety

@@ -209,7 +209,7 @@ impl CommandScopes {
         Self { before, ..self }
     }
 
-    /// The users on both sides of a barrier. Any users before it or after it are those of the application.
+    /// The users on both sides of a barrier. Where the recording has [`Users::Any`], the application's scopes count.
     fn of_barrier(self, [from, to]: [Users; 2]) -> [Users; 2] {
         let either = |users, named: CommandUsers| match users {
             Users::Any => named.into(),

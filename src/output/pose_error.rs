@@ -59,7 +59,7 @@ pub enum PoseError {
         /// The number of the layer's tracks.
         tracks: usize,
     },
-    /// There is not one weight for each rotation.
+    /// The number of weights is not the number of rotations.
     #[error("{weights} weights were given for {rotations} rotations; give one for each")]
     RotationWeights {
         /// The number of weights.

@@ -108,7 +108,7 @@ impl Engine {
     /// with these weights; they are computed on the threads of the host, whatever the engine's device is.
     ///
     /// # Errors
-    /// As [`Engine::mix`]; also when there is not one weight for each rotation.
+    /// As [`Engine::mix`]; also when the number of weights is not the number of rotations.
     pub fn mix_each(
         &self,
         from: &Rotations,

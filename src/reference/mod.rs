@@ -12,7 +12,7 @@
 //!    the method's name. Many are a `HandleRule`: two control rotations for each key. Methods that need only two keys
 //!    are in `two_keys`, methods with other equations in `b_spline` and `c2`.
 //! 3. `Segment`: the curve between two keys as a formula: one of a few that several methods share, or any function of
-//!    four quaternions, which is next to its definition. Its velocity is the formula's if that is simple, otherwise a
+//!    four quaternions, defined beside the method. Its velocity is the formula's if that is simple, otherwise a
 //!    difference of high order; its acceleration is always a difference.
 //! 4. [`ReferenceCurve`]: one track's segments, evaluated at any time; at constant speed by `CurveLengths`.
 //!

@@ -66,8 +66,8 @@ pub(crate) fn in_seconds(seconds: f64) -> InSeconds {
     }
 }
 
-/// Spans of 2^-40 s to 2^62 s keep the unit of a second: their reciprocals are at least 2^-62, and the 2^-64 s around the
-/// middle that become 0 are less than a rounding of the parameter.
+/// In spans of 2^-40 s to 2^62 s, distances are counted in seconds. The reciprocals of such spans are at least 2^-62, so
+/// they are not flushed. Distances below 2^-64 s become 0, which changes the parameter by less than its rounding.
 const SHORT: f64 = 1.0 / (1u64 << 40) as f64;
 const LONG: f64 = (1u64 << 62) as f64;
 

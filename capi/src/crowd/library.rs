@@ -75,8 +75,8 @@ impl TumbleCrowdLibrary {
 ///
 /// `parents` are the indices of the joints' parents, -1 for a root; parents may come after their children. `offsets`
 /// are three numbers `x y z` for each joint: the position in the parent's frame, for clips without translations of the
-/// joint. Null: all are 0. `ticks_per_second` is the number of ticks in a second, 0 for 705 600. A clip has up to 2 147
-/// 221 504 ticks, which are 50 minutes by default. The arrays are copied. The caller frees the library with
+/// joint. Null: all are 0. `ticks_per_second` is the number of ticks in a second, 0 for 705 600. A clip has up to
+/// 2147221504 ticks, which are 50 minutes by default. The arrays are copied. The caller frees the library with
 /// `tumble_crowd_library_free`.
 ///
 /// # Errors
@@ -144,7 +144,7 @@ pub(crate) unsafe fn vector_method(
 /// (`tumble_crowd_library_set_reference`). `clip` receives the clip's index, counted from 0; it may be null.
 ///
 /// # Errors
-/// - `TUMBLE_RESULT_INVALID_INPUT` if the set has not one track for each joint, a track has the name of no joint, a
+/// - `TUMBLE_RESULT_INVALID_INPUT` if the set does not have exactly one track for each joint, a track has the name of no joint, a
 ///   track cannot be interpolated as requested, the quantity is not the rotation, a curve rotates so fast that no
 ///   polynomial fits it, the clip is too long, or the library is full.
 /// - `TUMBLE_RESULT_INVALID_ARGUMENT` if a name is unknown.
@@ -187,7 +187,7 @@ pub unsafe extern "C" fn tumble_crowd_library_push(
 /// the mask for `TumbleCrowdLayer.mask`, counted from 1; it may be null.
 ///
 /// # Errors
-/// `TUMBLE_RESULT_INVALID_INPUT` if there is not one weight for each joint, a weight is outside 0 to 1, or the
+/// `TUMBLE_RESULT_INVALID_INPUT` if the number of weights is not that of joints, a weight is outside 0 to 1, or the
 /// library has 31 masks already.
 ///
 /// # Safety

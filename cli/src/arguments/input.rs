@@ -467,7 +467,7 @@ struct NamedPath<'a> {
 #[derive(Default)]
 struct Expansion {
     found: Vec<FoundInput>,
-    /// The inputs that `--exclude` leaves out. Directories count theirs only if none is left.
+    /// The number of inputs that `--exclude` leaves out. The files of a directory count only if none of them is left.
     excluded: usize,
     /// The path is a pattern that no file matches.
     is_unmatched: bool,
@@ -850,8 +850,8 @@ fn matches(pattern: &Path) -> Vec<FoundInput> {
         .collect()
 }
 
-/// The paths in a list: one on each line, where blank lines and lines that begin with `#` are none; or ended by NUL
-/// characters.
+/// The paths in a list: one on each line, without blank lines and lines that begin with `#`; or each ended by a NUL
+/// character.
 fn read_list(list: &Path, is_null_separated: bool) -> Result<Vec<PathBuf>, Failure> {
     let read = if names::is_standard(list) {
         let mut text = Vec::new();

@@ -21,7 +21,7 @@ use crate::messages::names;
 /// The heading of these options in help.
 pub(crate) const PATHS: &str = "Paths";
 
-/// How paths are followed. Those whose meaning an option of rotations has too are called `--path-…`, in every command.
+/// How paths are followed. Options that also exist for rotations are called `--path-…` here, in every command.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct PathArguments {
     /// The duration, seconds: of paths without times

@@ -28,7 +28,7 @@ const MAX_EXPANSION: u64 = 1024;
 /// and in the keys.
 const DECODED: usize = 8;
 
-/// Whether the first bytes are those of a stream: a message that is not endless.
+/// Whether the first bytes are those of a stream: a message of a plausible length.
 pub(crate) fn is_stream(start: &[u8]) -> bool {
     let length = start
         .strip_prefix(&CONTINUATION)

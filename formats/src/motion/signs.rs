@@ -57,7 +57,8 @@ impl Signs {
         all
     }
 
-    /// Whether no sign changes in some samples of tracks, one track after another. If so, they are processed.
+    /// Goes through samples that continue the tracks, one track after another, if no sign changes among them. Returns
+    /// whether this is so.
     fn go_on(&mut self, mut rotations: &[Quat]) -> bool {
         let [mut before] = self.before[..] else {
             return false;

@@ -47,8 +47,8 @@ impl Robot {
     /// file's bodies are where their joints put them, and depth first in files without bodies.
     ///
     /// # Errors
-    /// When no clip has the joints of this robot (`E904`), or the bodies contradict the order (`E907`). Those of several
-    /// clips that are refused are in [`Loaded::refused`].
+    /// When no clip has the joints of this robot (`E904`), or the bodies contradict the order (`E907`). If
+    /// only some of several clips are refused, their errors are in [`Loaded::refused`].
     pub fn assign(
         &self,
         loaded: &mut Loaded,

@@ -221,7 +221,7 @@ impl Clip {
         hasher.finish()
     }
 
-    /// Its arrays, of which pickles of protocol 5 hand on the memory. The other contents of its file are not
+    /// The arrays of the clip, for pickles. Protocol 5 passes their memory on without a copy. The other contents of its file are not
     /// copied: a copy is saved as a clip without a file.
     fn __reduce_ex__<'py>(
         slf: &Bound<'py, Self>,

@@ -456,7 +456,7 @@ impl Crowd {
         self.set_clock(self.clock().saturating_add(ticks))
     }
 
-    /// Moves the clock forward by `seconds`, rounded to ticks. If steps are no whole numbers of ticks, the rounding
+    /// Moves the clock forward by `seconds`, rounded to ticks. If steps are not whole numbers of ticks, the rounding
     /// errors of many steps add up: if the clock must follow frames exactly, as in a film at 30000/1001 frames a
     /// second, use [`Crowd::set_clock`] with each frame's time.
     ///

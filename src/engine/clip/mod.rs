@@ -23,7 +23,7 @@ use crate::stream::{Chunk, run};
 use crate::time::error::SampleTimesError;
 use crate::time::frames::{SampleTimes, Timeline};
 
-/// A set that is prepared for its method, or for the method of each track, and stored on its engine's device. It may be
+/// A set that is prepared for one method, or for a method of each track, and stored on its engine's device. It may be
 /// evaluated any number of times, at any sample times.
 pub struct Clip {
     engine: Engine,
@@ -202,7 +202,7 @@ impl Clip {
     }
 
     /// Prepares the evaluation of single samples and poses on the calling thread, with the bits of [`Clip::evaluate`]
-    /// at listed times. A clip on a Vulkan device is sampled on the host too, which keeps its segments.
+    /// at listed times. A clip on a Vulkan device is sampled on the host, too, which keeps what is needed for it.
     ///
     /// # Errors
     /// When the segments of the clip exceed the engine's memory limit, and samples cannot be computed from the keys of

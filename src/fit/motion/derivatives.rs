@@ -57,7 +57,7 @@ impl<F: Formula> Sampling for MotionOf<F> {
     }
 }
 
-/// Samples velocities or accelerations, curve by curve: of those at constant speed, and of formulas that are long.
+/// Samples velocities or accelerations, one curve at a time: for curves at constant speed, and for long formulas.
 pub(crate) struct Motion;
 
 impl Sampling for Motion {

@@ -6,13 +6,13 @@ use glam::{DVec3, Quat};
 use crate::tracks::error::TrackError;
 use crate::tracks::set::{TrackSet, check_finite, check_length};
 
-/// Tension, continuity and bias of a key (Kochanek, Bartels 1984); 0 is neutral, and usual values are from -1 to 1.
+/// Tension, continuity and bias of a key (Kochanek, Bartels 1984); 0 is neutral, and common values are from -1 to 1.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Tcb {
     /// With 1 the velocity at the key is 0, with -1 it is doubled.
     pub tension: f64,
-    /// With -1 the curve has a corner at the key; with 1 the corner points the other way, because the curve swings out
-    /// beyond the key before and after it.
+    /// With -1 the curve has a corner at the key; with 1 the corner points the other way, because the curve overshoots
+    /// on both sides of the key.
     pub continuity: f64,
     /// With 1 the tangent at the key follows the interval before it, with -1 the interval after it.
     pub bias: f64,

@@ -3,9 +3,9 @@
 //! runs of one track. Frame by frame the list has the runs of one track, and each lane of a run evaluates another
 //! repetition.
 //!
-//! Tracks with the same times have the same runs; what differs is which segment, constant and part of the result a run
-//! is of, and these are as far from track to track as from the first to the second. This is looked up in what was
-//! prepared, not assumed: a curve that was cut, or a track that the host evaluates, has other spans.
+//! Tracks with the same times have the same runs. Only the indices of the segment, the constant and the part of the
+//! result differ; they grow from each track to the next by the same amounts as from the first to the second. This is
+//! checked in what was prepared, not assumed: a curve that was cut, or a track that the host evaluates, has other spans.
 
 use std::iter::zip;
 

@@ -531,7 +531,7 @@ impl ClipPair<'_> {
     /// Refuses rotations relative to the parents beside rotations relative to the world.
     ///
     /// # Errors
-    /// Which clip has the ones and which the others.
+    /// When one clip has rotations relative to the parents and the other relative to the world; the error names both.
     pub fn check_spaces(&self) -> Result<(), CompareError> {
         let [first, second] = self.clips.map(|clip| clip.is_world);
         let has_parents = |clip: &&Motion| clip.skeleton.iter().any(|joint| joint.parent.is_some());

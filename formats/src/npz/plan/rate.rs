@@ -62,7 +62,7 @@ impl ArchivePlan {
     }
 
     /// Warns if the duration of a file contradicts its rate: a rate that is twice or half of that of the recording.
-    /// Durations include the last frame or not, and a part may have been cut off.
+    /// A duration may or may not include the last frame, and a part may have been cut off.
     pub(crate) fn compare_length(&mut self, archive: &Archive, name: &str) {
         const LEAST_FACTOR: f64 = 1.5;
         let Some(rate) = self.rate else {
