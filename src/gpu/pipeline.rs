@@ -9,7 +9,7 @@ use tumble_exact::{float_controls, without_decorations};
 use crate::gpu::device::LogicalDevice;
 use crate::machine::error::VulkanError;
 use crate::machine::error::calls::Named;
-use crate::shader::{Access, Kernel, spirv};
+use crate::shader::{Access, Kernel};
 use crate::work::recording::MAX_PUSHED;
 
 /// A compute pipeline with its layouts.
@@ -26,6 +26,13 @@ pub(crate) struct Pipeline {
     /// A hash of the code that was passed to the driver.
     pub(crate) code_hash: u64,
     pub(crate) has_run: AtomicBool,
+}
+
+/// A hash of words (64-bit FNV-1a, a word at a time), the same in every process.
+fn hash(words: &[u32]) -> u64 {
+    words.iter().fold(0xcbf2_9ce4_8422_2325, |hash, &word| {
+        (hash ^ u64::from(word)).wrapping_mul(0x100_0000_01b3)
+    })
 }
 
 /// The code of a kernel as it is passed to the driver.
@@ -59,7 +66,7 @@ impl Pipeline {
     /// The hash of a kernel's code on this device.
     pub(crate) fn code_hash(device: &LogicalDevice, kernel: Kernel) -> u64 {
         let (_, code, _) = kernel.code(device.variants());
-        spirv::hash(&words(device, code, Exactness::Demanded))
+        hash(&words(device, code, Exactness::Demanded))
     }
 
     pub(crate) fn new(
@@ -139,7 +146,7 @@ impl Pipeline {
         pipeline.layout = unsafe { device.raw.create_pipeline_layout(&info, None) }
             .named("vkCreatePipelineLayout")?;
 
-        pipeline.code_hash = spirv::hash(words);
+        pipeline.code_hash = hash(words);
         let info = vk::ShaderModuleCreateInfo::default().code(words);
         // SAFETY: the words are valid SPIR-V: naga made and validated them, and the passes keep them valid.
         let module = unsafe { device.raw.create_shader_module(&info, None) }

@@ -1,4 +1,4 @@
-//! Changes of compiled kernels that measurements compare, and hashes of them.
+//! Changes of compiled kernels that measurements compare.
 
 use std::collections::BTreeMap;
 
@@ -14,13 +14,6 @@ mod op {
     pub(super) const STORE: u16 = 62;
     pub(super) const MULTIPLY_INTEGERS: u16 = 132;
     pub(super) const SHIFT_RIGHT: u16 = 194;
-}
-
-/// A hash of words (64-bit FNV-1a, a word at a time), the same in every process.
-pub(crate) fn hash(words: &[u32]) -> u64 {
-    words.iter().fold(0xcbf2_9ce4_8422_2325, |hash, &word| {
-        (hash ^ u64::from(word)).wrapping_mul(0x100_0000_01b3)
-    })
 }
 
 /// A module whose workgroups have `to` invocations along x instead of `from`. Constants that are `from` are changed where
