@@ -131,7 +131,7 @@ impl InLanes for RotationVectors<'_> {
     fn run<L: Lanes>(&mut self) {
         let outputs = self.output.as_chunks_mut::<VECTOR_NUMBERS>().0;
         for (rotation, output) in self.rotations.iter().zip(outputs) {
-            // Of the two quaternions of a rotation, the one with w of 0 or more has the smaller angle.
+            // A rotation has two quaternions; that with w of 0 or more has the smaller angle.
             let sign = if rotation[3] < 0.0 { -1.0 } else { 1.0 };
             let half = log(rotation.map(|number| sign * f64::from(number)));
             *output = half.map(|number| (2.0 * number) as f32);
