@@ -110,8 +110,8 @@ pub(crate) fn rotations_of_six<'py>(
     array(numbers.py(), found, with(&shape, 4))
 }
 
-/// The headings of `quaternions` (…, 4), float64 (…), rad from -π to π about the axis that points `up`, "y" or "z". By
-/// default it is the twist about that axis; with `axis` "x", "y" or "z", it is the direction of this axis of the body
+/// The headings of `quaternions` (…, 4) in radians, from -π to π, about the axis that points `up`, "y" or "z": float64 (…).
+/// By default it is the twist about that axis; with `axis` "x", "y" or "z", it is the direction of this axis of the body
 /// on the ground. With z up the heading of +x is 0, with y up that of +z.
 ///
 /// >>> import tumble

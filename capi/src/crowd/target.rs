@@ -86,7 +86,8 @@ pub unsafe extern "C" fn tumble_crowd_target_new(
 /// kinematics), and `tumble_crowd_record` with the stage's target, which makes them skinning matrices. The stage
 /// continues the matrices of as many instances as are visible when it is recorded, whatever wrote them. Results have the
 /// bits of the CPU, if all numbers are finite and less than 2^36 in magnitude; where nothing was changed, they have the
-/// bits of an evaluation without stages. The rest is as for `tumble_crowd_target_new`, also the errors.
+/// bits of an evaluation without stages. The buffer, its range and the errors are
+/// as for `tumble_crowd_target_new` with matrices in 32 bits.
 ///
 /// # Safety
 /// As for `tumble_crowd_target_new`.

@@ -318,7 +318,7 @@ impl Engine {
     }
 
     /// The rotations as matrices for column vectors: float32, (tracks, frames, 3, 3), or with `columns=4`
-    /// (tracks, frames, 3, 4), the last column, the translation, 0. Other keywords are those of `evaluate`.
+    /// (tracks, frames, 3, 4), whose last column, the translation, is 0. Other keywords are those of `evaluate`.
     ///
     /// >>> import tumble
     /// >>> clip = tumble.Clip([0.0, 2.0], [[0, 0, 0, 1], [0, 0, 1, 0]])
