@@ -128,7 +128,9 @@ pub enum CrowdError {
         joint: usize,
     },
     /// Skinning matrices are requested, but the library has no inverse bind matrices.
-    #[error("the library has no inverse bind matrices; call set_inverse_bind")]
+    #[error(
+        "the library had no inverse bind matrices when the crowd was made; call set_inverse_bind before Engine::crowd"
+    )]
     NoInverseBind,
     /// The number of instances is 0 or too large.
     #[error("{requested} instances; there can be 1 to {}", MAX_INSTANCES)]

@@ -69,7 +69,7 @@ enum TumbleResult
   TUMBLE_RESULT_INVALID_HANDLE = 2,
   /*
    An argument is invalid: an unknown constant or name, a number out of its range, an array that is too large for
-   memory, a structure whose `size` is that of another version, text that is not UTF-8, or objects that do not
+   memory, a structure whose `size` is that of no version or of a newer one, text that is not UTF-8, or objects that do not
    belong together.
    */
   TUMBLE_RESULT_INVALID_ARGUMENT = 3,
@@ -480,8 +480,8 @@ enum TumblePassOperation
    */
   TUMBLE_PASS_OPERATION_ADD = 2,
   /*
-   Rotations and positions in the world, from one input, the rotations in the parents' frames, and a skeleton. No
-   weight; the layout must be `TUMBLE_LAYOUT_FRAME_MAJOR`.
+   Rotations and positions in the world, of the skeleton `parents` and `offsets`. The one input is the rotations in
+   the parents' frames. No weight; the layout must be `TUMBLE_LAYOUT_FRAME_MAJOR`.
    */
   TUMBLE_PASS_OPERATION_WORLD = 3,
 };
@@ -677,7 +677,7 @@ typedef struct TumbleInterpolation {
   double tension;
   /*
    The continuity of "kochanek-bartels", likewise. With -1 the curve has a corner at a key; with 1 the corner
-   points the other way, because the curve swings out beyond the key before and after it.
+   points the other way, because the curve overshoots on both sides of the key.
    */
   double continuity;
   /*
@@ -890,8 +890,8 @@ typedef struct TumbleVulkan {
   void *queue_user;
   /*
    The application's `VkPipelineCache`, in which the library makes its pipelines, or 0 (`VK_NULL_HANDLE`). It must
-   not be synchronized externally, and must stay valid until the engine and all objects that were made with it are
-   freed. The library neither reads this cache from a file nor writes it to one. 0: the library makes a cache and
+   have been created without `VK_PIPELINE_CACHE_CREATE_EXTERNALLY_SYNCHRONIZED_BIT`, and must stay valid until the
+   engine and all objects that were made with it are freed. The library neither reads this cache from a file nor writes it to one. 0: the library makes a cache and
    keeps it in a file (`TumbleEngineOptions.cache_directory`).
    */
   uint64_t pipeline_cache;
@@ -1330,7 +1330,7 @@ TumbleResult tumble_upload(const struct TumbleEngine *engine,
 
 /*
  Returns the memory that a clip takes on the host for each key, in bytes: 16 or more if the clip keeps its keys; if
- the clip keeps segments, 64 or more for arcs (slerp), and 144 to 208 or more for polynomials. On the CPU, a clip
+ the clip keeps segments, at least 64 for arcs (slerp), at least 144 for polynomials. On the CPU, a clip
  whose segments would exceed the limit `memory` of `TumbleEngineOptions` keeps its keys instead, if samples can be
  computed from them.
 
@@ -1692,7 +1692,7 @@ TumbleResult tumble_pass_to_buffer(const struct TumbleEngine *engine,
  Prepares the recording of a pass, whose result goes to a range of the application's Vulkan buffer.
 
  The kernel is compiled and memory is allocated here, not when a frame is recorded. If the kernel was not checked
- before, this call checks it, and then submits to the engine's queue. The buffers must be as `tumble_pass_to_buffer`
+ before, this call checks it; only then it submits to the engine's queue. The buffers must be as `tumble_pass_to_buffer`
  says. The target does not need the engine afterwards. The application frees the target with
  `tumble_pass_target_free` before it destroys a buffer or the device.
 
@@ -1807,8 +1807,8 @@ TumbleResult tumble_set_scales(struct TumbleSet *set,
 
  # Errors
  - `TUMBLE_RESULT_INVALID_POINTER` if a required handle or function is null.
- - `TUMBLE_RESULT_INVALID_ARGUMENT` if the version is below 1.1 or above the loader's, or the physical device or a
-   queue family does not fit.
+ - `TUMBLE_RESULT_INVALID_ARGUMENT` if the version is below 1.1, or the physical device or a queue family does not
+   fit.
  - `TUMBLE_RESULT_DEVICE` if the device fails the self-test.
 
  # Safety
@@ -1824,8 +1824,8 @@ TumbleResult tumble_engine_from_vulkan(const struct TumbleVulkan *vulkan,
 
  `parents` are the indices of the joints' parents, -1 for a root; parents may come after their children. `offsets`
  are three numbers `x y z` for each joint: the position in the parent's frame, for clips without translations of the
- joint. Null: all are 0. `ticks_per_second` is the number of ticks in a second, 0 for 705 600. A clip has up to 2 147
- 221 504 ticks, which are 50 minutes by default. The arrays are copied. The caller frees the library with
+ joint. Null: all are 0. `ticks_per_second` is the number of ticks in a second, 0 for 705 600. A clip has up to
+ 2147221504 ticks, which are 50 minutes by default. The arrays are copied. The caller frees the library with
  `tumble_crowd_library_free`.
 
  # Errors
@@ -1856,7 +1856,7 @@ TumbleResult tumble_crowd_library_new(const int32_t *parents,
  (`tumble_crowd_library_set_reference`). `clip` receives the clip's index, counted from 0; it may be null.
 
  # Errors
- - `TUMBLE_RESULT_INVALID_INPUT` if the set has not one track for each joint, a track has the name of no joint, a
+ - `TUMBLE_RESULT_INVALID_INPUT` if the set does not have exactly one track for each joint, a track has the name of no joint, a
    track cannot be interpolated as requested, the quantity is not the rotation, a curve rotates so fast that no
    polynomial fits it, the clip is too long, or the library is full.
  - `TUMBLE_RESULT_INVALID_ARGUMENT` if a name is unknown.
@@ -1881,7 +1881,7 @@ TumbleResult tumble_crowd_library_push(struct TumbleCrowdLibrary *library,
  the mask for `TumbleCrowdLayer.mask`, counted from 1; it may be null.
 
  # Errors
- `TUMBLE_RESULT_INVALID_INPUT` if there is not one weight for each joint, a weight is outside 0 to 1, or the
+ `TUMBLE_RESULT_INVALID_INPUT` if the number of weights is not that of joints, a weight is outside 0 to 1, or the
  library has 31 masks already.
 
  # Safety
@@ -2376,7 +2376,8 @@ TumbleResult tumble_crowd_target_new(const struct TumbleCrowd *crowd,
  kinematics), and `tumble_crowd_record` with the stage's target, which makes them skinning matrices. The stage
  continues the matrices of as many instances as are visible when it is recorded, whatever wrote them. Results have the
  bits of the CPU, if all numbers are finite and less than 2^36 in magnitude; where nothing was changed, they have the
- bits of an evaluation without stages. The rest is as for `tumble_crowd_target_new`, also the errors.
+ bits of an evaluation without stages. The buffer, its range and the errors are
+ as for `tumble_crowd_target_new` with matrices in 32 bits.
 
  # Safety
  As for `tumble_crowd_target_new`.

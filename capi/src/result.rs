@@ -184,7 +184,9 @@ fn crowd_words(error: &CrowdError) -> String {
             "the library has no clips; tumble_crowd_library_push gives it one".to_owned()
         }
         CrowdError::NoInverseBind => {
-            "the library has no inverse bind matrices; tumble_crowd_library_set_inverse_bind gives it some".to_owned()
+            "the library had no inverse bind matrices when the crowd was made; call \
+             tumble_crowd_library_set_inverse_bind before tumble_crowd_new"
+                .to_owned()
         }
         CrowdError::NothingSubmitted => {
             "nothing is in flight; call tumble_crowd_submit first".to_owned()

@@ -390,7 +390,7 @@ mod tests {
                 .iter()
                 .map(|warning| (warning.code, &*warning.message))
                 .collect();
-            let expected = warned.map(|count| format!("{count} after each pose are left out"));
+            let expected = warned.map(|count| format!("left out: {count} after each pose"));
             let expected: Vec<_> = expected
                 .iter()
                 .map(|message| (Code::FurtherNumbers, &**message))

@@ -19,7 +19,7 @@ use crate::simd::dispatch::VectorWidth;
 use crate::twin::{pose_blend, pose_mix};
 
 /// The number of layers that are blended without an allocation.
-const FEW_LAYERS: usize = 8;
+const LAYERS_IN_ARRAYS: usize = 8;
 
 /// The number of rotations that the host computes at once.
 const HOST_WINDOW: usize = 1 << 20;
@@ -87,9 +87,9 @@ impl Engine {
         let count = layers.len();
         self.each_on_host(first, |index| {
             // Few layers are blended without an allocation.
-            let mut poses = [[0.0; 4]; FEW_LAYERS];
-            let mut weights = [0.0; FEW_LAYERS];
-            if count > FEW_LAYERS {
+            let mut poses = [[0.0; 4]; LAYERS_IN_ARRAYS];
+            let mut weights = [0.0; LAYERS_IN_ARRAYS];
+            if count > LAYERS_IN_ARRAYS {
                 let poses: Vec<[f32; 4]> = layers
                     .iter()
                     .map(|(layer, _)| layer.as_arrays()[index])
