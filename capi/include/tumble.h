@@ -69,8 +69,8 @@ enum TumbleResult
   TUMBLE_RESULT_INVALID_HANDLE = 2,
   /*
    An argument is invalid: an unknown constant or name, a number out of its range, an array that is too large for
-   memory, a structure whose `size` is that of no version or of a newer one, text that is not UTF-8, or objects that do not
-   belong together.
+   memory, a structure whose `size` is that of no version or of a newer one, text that is not UTF-8, or objects that
+   do not belong together.
    */
   TUMBLE_RESULT_INVALID_ARGUMENT = 3,
   /*
