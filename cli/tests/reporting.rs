@@ -182,7 +182,7 @@ fn a_dry_run_names_the_results_that_the_batch_then_makes_skips_and_removes() {
         }
         // A link to the same bytes is as good.
         std::os::unix::fs::symlink("d.npy", folder.join("out/a.npy")).unwrap();
-        let whole = "in/a.dat → out/a.npy (complete, would be skipped)";
+        let whole = "in/a.dat → out/a.npy (complete, would be kept)";
         assert_eq!(reason("eval in -o out -n --resume"), whole);
     }
     let one = run(folder, &words("eval in/m.gltf -o m.npy -n"));
@@ -318,7 +318,7 @@ fn results_are_named_by_paths_without_links() {
     let said = "inputs/latest/a.dat: is the same file as inputs/shots/a.dat, and is processed once";
     assert!(run.words.contains(said), "{}", run.words);
     assert!(
-        run.words.contains("because of its ending (.txt)"),
+        run.words.contains("because of their endings (.txt)"),
         "{}",
         run.words
     );

@@ -155,7 +155,7 @@ fn a_lost_plan_is_named_and_written_again() {
     }
     let resumed = succeed(folder, &shard("out", &bytes, "1/1", &["--resume"]));
     assert!(
-        resumed.words.contains("4 results skipped"),
+        resumed.words.contains("4 results kept"),
         "{}",
         resumed.words
     );

@@ -44,7 +44,7 @@ fn what_is_no_part_of_the_motion_is_named() {
         (
             "euroc/velocities.euroc",
             Code::FurtherNumbers,
-            "1 numbers after",
+            "1 number after",
         ),
         (
             "bvh/frames_fewer.bvh",

@@ -82,7 +82,9 @@ impl ByteReader<'_> {
 
 /// An error or warning about text has a line and column within it.
 fn location_is_inside(bytes: &[u8], said: &Diagnostic) {
-    let lines = bytes.iter().filter(|&&byte| byte == b'\n').count() as u64;
+    // A CR at the very end ends a line, too.
+    let ends = bytes.iter().filter(|&&byte| byte == b'\n').count();
+    let lines = (ends + usize::from(bytes.ends_with(b"\r"))) as u64;
     if let Some(Location::Text { line, column }) = said.location {
         assert!(1 <= line && line <= lines + 1, "line {line} of {lines}");
         assert!(1 <= column && column <= bytes.len() as u64 + 1);

@@ -432,7 +432,9 @@ impl<'a> InputHashes<'a> {
     fn absent(&self, entries: &[&'a ManifestEntry]) -> AbsentFiles<'a> {
         let mut absent = AbsentFiles::default();
         for &entry in entries {
-            if !self.inputs.get(&*entry.input).is_some_and(Option::is_none) {
+            let is_read = !self.inputs.get(&*entry.input).is_some_and(Option::is_none);
+            // A table has rows of many inputs, of which the manifest names the directory.
+            if is_read || Path::new(&entry.input).is_dir() {
                 continue;
             }
             match InputPresence::of_entry(entry) {

@@ -354,7 +354,10 @@ class Clip:
     ) -> DeviceArray: ...
     def select(self, tracks: Sequence[str] | Sequence[int], *, collapse: bool = False) -> Clip:
         """The clip with some of its joints, `tracks`, by their names or indices, in this order. Their parents must be
-        included, too."""
+        included, too, unless `collapse`: then the motion of a joint that is left out is not lost. Its child becomes a child of
+        the nearest ancestor that is included, or a root, with the product of the rotations and translations in between, so that
+        included joints have the same poses in the world at their keys. Such a joint has keys of translations if a joint above it
+        turns, at the key times of all joints in the product."""
     def cut(self, start: float | None = None, end: float | None = None) -> Clip:
         """The part of the clip from `start` to `end` (in seconds); without `start` from its first key, without `end` to
         its last. Keys keep their times and bits. A channel without a key at a cut gets one there, of its curve. Steps,
@@ -362,7 +365,11 @@ class Clip:
     def retime(self, *, speed: float | None = None, start: float | None = None) -> Clip:
         """Returns the clip, played `speed` times as fast. The first key is moved to `start` (in seconds); without `start`,
         the key stays at its time. Keys keep their bits; velocities and tangents are multiplied by the speed."""
-    def mirrored(self, axis: _Axis, *, robot: Robot | None = None) -> Clip: ...
+    def mirrored(self, axis: _Axis, *, robot: Robot | None = None) -> Clip:
+        """The mirror image of the clip at the plane through the origin across `axis`, "x", "y" or "z", from left to right.
+        Joints are exchanged with those of the same name on the other side (`features.mirror_pairs`), also if their axes at
+        rest are no mirror images; the skeleton stays as it is. Keys keep their times. The signs of a robot's joints depend
+        on their axes, which are those of `robot`."""
     @staticmethod
     def concat(clips: Sequence[Clip], *, gap: float | None = None) -> Clip:
         """Several clips, one after another. Joints are matched by name, and have the order and the name of the first clip.
@@ -738,7 +745,7 @@ class Engine:
         bias: float | None = None,
     ) -> _Single:
         """The rotations as matrices for column vectors: float32, (tracks, frames, 3, 3), or with `columns=4`
-        (tracks, frames, 3, 4), the last column, the translation, 0. Other keywords are those of `evaluate`."""
+        (tracks, frames, 3, 4), whose last column, the translation, is 0. Other keywords are those of `evaluate`."""
     @overload
     def matrices(
         self,
@@ -988,7 +995,8 @@ class Engine:
         out: _Single | None = None,
     ) -> _Single:
         """Slerp, the shorter way, from every rotation of the first array (…, 4) to that of the second, by a `weight`
-        from 0 to 1. Tracks are combined by index, as in `blend`."""
+        from 0 to 1, or an array of weights, (…), such as one for each frame. The shapes broadcast. Tracks are combined by
+        index, as in `blend`."""
     def add(
         self,
         base: _Keys,
@@ -1600,7 +1608,8 @@ class ArrayDifference:
     def differing(self) -> int:
         """The number of numbers that differ."""
     @property
-    def not_finite(self) -> int: ...
+    def not_finite(self) -> int:
+        """The number of numbers that are NaN or infinite in only one of the arrays; not in `difference`."""
     @property
     def difference(self) -> Spread:
         """The differences of numbers."""
@@ -1689,9 +1698,11 @@ class ClipDifference:
     def joints(self) -> list[JointDifference]:
         """The differences of each track, in the order of the first clip."""
     @property
-    def scalars(self) -> list[ChannelDifference]: ...
+    def scalars(self) -> list[ChannelDifference]:
+        """The differences of each scalar that both clips have: angles in degrees, others as they are."""
     @property
-    def missing_scalars(self) -> tuple[list[str], list[str]]: ...
+    def missing_scalars(self) -> tuple[list[str], list[str]]:
+        """The names of the scalars that only one clip has: a list for the first clip, and one for the second."""
 
 @final
 class PathStatistics:
