@@ -180,6 +180,9 @@ fn is_exact(instruction: &str, generation: Generation) -> bool {
             let zero = operands.get(3).copied().unwrap_or_default();
             operands.get(1) == Some(&"1.0") && (zero.starts_with("neg(0)") || zero == "neg(lo(0))")
         }
+        // Two numbers side by side. Where the mode flushes subnormal numbers it would flush them; the kernels that convert ask
+        // for a mode that keeps them, and Mesa packs so only then.
+        "pack_b32_f16" => true,
         _ if name.starts_with("cmp_") || name.starts_with("cmpx_") => true,
         "mad_f32" | "mac_f32" | "madak_f32" | "madmk_f32" => generation == Generation::Gcn,
         // The product with a power of two is exact, and the sum is rounded once.
@@ -215,6 +218,7 @@ fn what_rounds_otherwise_is_refused() {
         "v_min_f32_e32 v1, v2, v3",
         "v_min_num_f32_e32 v1, v2, v3",
         "v_cvt_f16_f32_e32 v1, v2",
+        "v_pack_b32_f16 v1, v2, v3",
         "v_fma_mixlo_f16 v1, 1.0, v2, neg(lo(0))",
         "v_fma_mixhi_f16 v1, 1.0, v2, neg(0) op_sel_hi:[0,0,1]",
         "v_mad_u32_u24 v1, v2, v3, v4",
