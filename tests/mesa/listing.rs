@@ -180,8 +180,8 @@ fn is_exact(instruction: &str, generation: Generation) -> bool {
             let zero = operands.get(3).copied().unwrap_or_default();
             operands.get(1) == Some(&"1.0") && (zero.starts_with("neg(0)") || zero == "neg(lo(0))")
         }
-        // Two numbers side by side. Where the mode flushes subnormal numbers it would flush them; the kernels that convert ask
-        // for a mode that keeps them, and Mesa packs so only then.
+        // Two numbers side by side. Where the mode flushes subnormal numbers it would flush them; the kernels that
+        // convert ask for a mode that keeps them, and Mesa packs so only then.
         "pack_b32_f16" => true,
         _ if name.starts_with("cmp_") || name.starts_with("cmpx_") => true,
         "mad_f32" | "mac_f32" | "madak_f32" | "madmk_f32" => generation == Generation::Gcn,
