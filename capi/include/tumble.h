@@ -2376,8 +2376,8 @@ TumbleResult tumble_crowd_target_new(const struct TumbleCrowd *crowd,
  kinematics), and `tumble_crowd_record` with the stage's target, which makes them skinning matrices. The stage
  continues the matrices of as many instances as are visible when it is recorded, whatever wrote them. Results have the
  bits of the CPU, if all numbers are finite and less than 2^36 in magnitude; where nothing was changed, they have the
- bits of an evaluation without stages. The buffer, its range and the errors are
- as for `tumble_crowd_target_new` with matrices in 32 bits.
+ bits of an evaluation without stages. The buffer, its range and the errors are as for `tumble_crowd_target_new` with
+ matrices in 32 bits.
 
  # Safety
  As for `tumble_crowd_target_new`.
@@ -2395,9 +2395,9 @@ TumbleResult tumble_crowd_stage_target_new(const struct TumbleCrowd *crowd,
 
  The commands write up to 20 bytes for each layer that changed since the last evaluation and 4 bytes for each
  instance of a new list of visible instances, and dispatch the kernels. A stage writes none of these changes; they
- remain for the next evaluation. If no instance is visible, nothing is recorded. Nothing is submitted, waited for or allocated. Barriers are included: the evaluation waits for all
- commands that were recorded before it; commands that are recorded after it, or submitted to the same queue later,
- see the result.
+ remain for the next evaluation. If no instance is visible, nothing is recorded. Nothing is submitted, waited for or
+ allocated. Barriers are included: the evaluation waits for all commands that were recorded before it; commands that
+ are recorded after it, or submitted to the same queue later, see the result.
 
  The command buffer must belong to the engine's device and to the family of the engine's queue, and must be in the
  recording state, outside a render pass. Everything that is recorded must be submitted to the engine's queue, once

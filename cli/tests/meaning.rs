@@ -479,14 +479,16 @@ fn rotations_that_are_lost_are_said() {
     );
 }
 
+/// A robot with a wheel, whose angle has no limits.
+const CART: &str = r#"<robot name="cart"><link name="base"/><link name="rim"/><joint name="wheel" type="continuous">
+  <parent link="base"/><child link="rim"/><axis xyz="0 1 0"/></joint></robot>"#;
+
 /// A wheel that turns for long has coarse angles in f32, and the step is said.
 #[test]
 fn coarse_steps_of_angles_are_said() {
     let temporary = tempfile::tempdir().unwrap();
     let folder = temporary.path();
-    let robot = r#"<robot name="cart"><link name="base"/><link name="rim"/><joint name="wheel" type="continuous">
-      <parent link="base"/><child link="rim"/><axis xyz="0 1 0"/></joint></robot>"#;
-    fs::write(folder.join("cart.urdf"), robot).unwrap();
+    fs::write(folder.join("cart.urdf"), CART).unwrap();
     for (name, last) in [("short", 100), ("long", 4000)] {
         let mut text = "t,wheel.scalar_angle\n".to_owned();
         for key in 0..=last {
@@ -510,9 +512,7 @@ fn coarse_steps_of_angles_are_said() {
 fn angles_that_count_turns_are_not_unwrapped() {
     let temporary = tempfile::tempdir().unwrap();
     let folder = temporary.path();
-    let robot = r#"<robot name="cart"><link name="base"/><link name="rim"/><joint name="wheel" type="continuous">
-      <parent link="base"/><child link="rim"/><axis xyz="0 1 0"/></joint></robot>"#;
-    fs::write(folder.join("cart.urdf"), robot).unwrap();
+    fs::write(folder.join("cart.urdf"), CART).unwrap();
     for step in [4.0, -33.0] {
         let mut text = "t,wheel.scalar_angle\n".to_owned();
         for key in 0..=100 {

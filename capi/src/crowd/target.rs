@@ -2,14 +2,14 @@
 
 use std::ffi::c_void;
 
-use tumble::crowd::CrowdStage;
-use tumble::vulkan::CrowdTarget;
+use tumble::crowd::{Crowd, CrowdStage};
+use tumble::vulkan::{CrowdTarget, VulkanBuffer};
 
 use crate::arguments::{Out, flag, option, vulkan};
 use crate::crowd::output;
 use crate::crowd::player::TumbleCrowd;
 use crate::handle::{self, Object};
-use crate::result::{TumbleResult, code};
+use crate::result::{Failure, TumbleResult, code};
 use crate::vulkan::buffer_range;
 
 /// Matrices of a crowd in a buffer that become those of a later stage, in place. The application may have changed
@@ -66,17 +66,13 @@ pub unsafe extern "C" fn tumble_crowd_target_new(
     size: u64,
     target: *mut *mut TumbleCrowdTarget,
 ) -> TumbleResult {
-    code(|| {
-        let out = Out::new(target, "target")?;
-        let crowd = handle::get(crowd)?;
+    let made = |crowd: &Crowd, buffer| {
         let output = output::output(values, flag(half, "half")?)?;
-        let buffer = buffer_range(crowd.is_on_application_device, buffer, offset, size)?;
         // SAFETY: as the caller promises.
-        let inner = unsafe { crowd.lock()?.inner.target(output, buffer)? };
-        // SAFETY: as the caller promises.
-        unsafe { out.set(handle::give(TumbleCrowdTarget { inner })) };
-        Ok(())
-    })
+        Ok(unsafe { crowd.target(output, buffer) }?)
+    };
+    // SAFETY: as the caller promises.
+    unsafe { new_target(crowd, [buffer, offset, size], target, made) }
 }
 
 /// Prepares a stage that continues matrices in a range of the application's Vulkan buffer, in place, in 32 bits.
@@ -86,8 +82,8 @@ pub unsafe extern "C" fn tumble_crowd_target_new(
 /// kinematics), and `tumble_crowd_record` with the stage's target, which makes them skinning matrices. The stage
 /// continues the matrices of as many instances as are visible when it is recorded, whatever wrote them. Results have the
 /// bits of the CPU, if all numbers are finite and less than 2^36 in magnitude; where nothing was changed, they have the
-/// bits of an evaluation without stages. The buffer, its range and the errors are
-/// as for `tumble_crowd_target_new` with matrices in 32 bits.
+/// bits of an evaluation without stages. The buffer, its range and the errors are as for `tumble_crowd_target_new` with
+/// matrices in 32 bits.
 ///
 /// # Safety
 /// As for `tumble_crowd_target_new`.
@@ -100,13 +96,30 @@ pub unsafe extern "C" fn tumble_crowd_stage_target_new(
     size: u64,
     target: *mut *mut TumbleCrowdTarget,
 ) -> TumbleResult {
+    let made = |crowd: &Crowd, buffer| {
+        let stage = option(stage, &CrowdStage::ALL, "stage")?;
+        // SAFETY: as the caller promises.
+        Ok(unsafe { crowd.stage_target(stage, buffer) }?)
+    };
+    // SAFETY: as the caller promises.
+    unsafe { new_target(crowd, [buffer, offset, size], target, made) }
+}
+
+/// Gives the handle of what `make` makes for a range of the application's buffer: handle, offset and size.
+///
+/// # Safety
+/// `target` must point to memory for a handle.
+unsafe fn new_target(
+    crowd: *const TumbleCrowd,
+    [buffer, offset, size]: [u64; 3],
+    target: *mut *mut TumbleCrowdTarget,
+    make: impl FnOnce(&Crowd, VulkanBuffer) -> Result<CrowdTarget, Failure>,
+) -> TumbleResult {
     code(|| {
         let out = Out::new(target, "target")?;
         let crowd = handle::get(crowd)?;
-        let stage = option(stage, &CrowdStage::ALL, "stage")?;
         let buffer = buffer_range(crowd.is_on_application_device, buffer, offset, size)?;
-        // SAFETY: as the caller promises.
-        let inner = unsafe { crowd.lock()?.inner.stage_target(stage, buffer)? };
+        let inner = make(&crowd.lock()?.inner, buffer)?;
         // SAFETY: as the caller promises.
         unsafe { out.set(handle::give(TumbleCrowdTarget { inner })) };
         Ok(())
@@ -118,9 +131,9 @@ pub unsafe extern "C" fn tumble_crowd_stage_target_new(
 ///
 /// The commands write up to 20 bytes for each layer that changed since the last evaluation and 4 bytes for each
 /// instance of a new list of visible instances, and dispatch the kernels. A stage writes none of these changes; they
-/// remain for the next evaluation. If no instance is visible, nothing is recorded. Nothing is submitted, waited for or allocated. Barriers are included: the evaluation waits for all
-/// commands that were recorded before it; commands that are recorded after it, or submitted to the same queue later,
-/// see the result.
+/// remain for the next evaluation. If no instance is visible, nothing is recorded. Nothing is submitted, waited for or
+/// allocated. Barriers are included: the evaluation waits for all commands that were recorded before it; commands that
+/// are recorded after it, or submitted to the same queue later, see the result.
 ///
 /// The command buffer must belong to the engine's device and to the family of the engine's queue, and must be in the
 /// recording state, outside a render pass. Everything that is recorded must be submitted to the engine's queue, once

@@ -247,23 +247,18 @@ impl Lister {
         if maps_samples && window.stride() == 1 {
             return self.list_spread(request, window, memory);
         }
-        let mut rows = GridRows::new(window).filter(|_| maps_samples);
-        if rows.is_some()
-            && let Some(shared) = SharedRuns::new(request, window)?
-        {
-            return shared.write(memory);
-        }
-        let (mut lists, mut grids) = (Vec::new(), Vec::new());
-        if let Some(rows) = rows {
-            lists = work(clip, timeline, window, Cut::Whole, &mut self.spare)?;
-            grids = rows.of_groups(&lists).unwrap_or_default();
-        }
-        if grids.is_empty() {
-            rows = None;
+        if let Some(rows) = GridRows::new(window).filter(|_| maps_samples) {
+            if let Some(shared) = SharedRuns::new(request, window)? {
+                return shared.write(memory);
+            }
+            let lists = work(clip, timeline, window, Cut::Whole, &mut self.spare)?;
+            let grids = rows.of_groups(&lists).unwrap_or_default();
+            if !grids.is_empty() {
+                return self.write_items(lists, Some(rows), &grids, timeline, memory);
+            }
             self.take_back(lists);
-            lists = work(clip, timeline, window, Cut::Short, &mut self.spare)?;
         }
-        self.write_items(lists, rows, &grids, timeline, memory)
+        self.list_items(request, window, memory)
     }
 
     /// Lists a window as items, one for each invocation, whatever the device and the times are. There are at most twice
