@@ -555,6 +555,12 @@ fn inputs_that_are_not_found_are_no_success() {
         String::from_utf8(alone.out).unwrap(),
         "2 results, unchanged since they were written\n"
     );
+    // A directory of its name is no input.
+    let input = work.join("in/a.dat");
+    fs::remove_file(&input).unwrap();
+    fs::create_dir(&input).unwrap();
+    let check = run(&work, &["check", "out"]);
+    assert_eq!(check.code, 8, "{}", check.words);
     // A result that has changed is found with this option too.
     fs::write(folder.join("work/out/a.npy"), "other").unwrap();
     let check = run(folder, &["check", "work/out", "--results-only"]);

@@ -279,3 +279,21 @@ fn humanml3d_of_other_units_is_said() {
     );
     assert!(!made.words.contains("warning"), "{}", made.words);
 }
+
+/// A joint that names a side is not mirrored in place without a word.
+#[test]
+fn joints_without_a_partner_are_said() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let walk = fs::read_to_string(root().join("data/walk.bvh")).unwrap();
+    let renamed = walk.replace("LeftFoot", "LeftFoot_011");
+    for (name, text, is_said) in [("a", walk, false), ("b", renamed, true)] {
+        fs::write(folder.join(format!("{name}.bvh")), text).unwrap();
+        let made = line(
+            folder,
+            &format!("features {name}.bvh --sets mirror -o {name}.npz"),
+        );
+        let said = "mirrored in place: 2 joints with the name of a side and no partner on the other (the first: ";
+        assert_eq!(made.words.contains(said), is_said, "{}", made.words);
+    }
+}

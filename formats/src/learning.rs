@@ -18,7 +18,7 @@ pub use humanml3d::{
     HUMANML3D_JOINTS, HUMANML3D_NUMBERS, Humanml3dError, humanml3d, positions_of_humanml3d,
 };
 pub use kimodo::{KIMODO_NUMBERS, KimodoError, kimodo};
-pub use mirror::{mirror_pairs, mirrored_point, mirrored_rotation};
+pub use mirror::{mirror_pairs, mirrored_point, mirrored_rotation, without_partner};
 pub use mirrored::{Mirror, MirrorError, MirrorReport, mirrored};
 pub use root_motion::{HeadingSource, RootMotion};
 pub use sets::{

@@ -7,7 +7,7 @@ use tumble::glam::{DMat3, DQuat, DVec3};
 use tumble_formats::learning::{
     ContactLimits, Ground, HUMANML3D_JOINTS, Humanml3dError, SixOrder, contacts, facing,
     forward_heading, humanml3d, majority, mirror_pairs, mirrored_point, mirrored_rotation,
-    positions_of_humanml3d, rotation_of_six, six, twist_heading,
+    positions_of_humanml3d, rotation_of_six, six, twist_heading, without_partner,
 };
 use tumble_formats::npy::read_numbers;
 
@@ -192,12 +192,16 @@ fn left_and_right_change_places() {
         "Leftover",
         "l_wrist",
         "left_only",
+        "LThumb",
+        "RThumb",
+        "LOD",
     ];
     let pairs = mirror_pairs(&names);
     let expected = [
-        1, 0, 3, 2, 4, 6, 5, 8, 7, 10, 9, 12, 11, 14, 13, 15, 16, 17, 18, 19,
+        1, 0, 3, 2, 4, 6, 5, 8, 7, 10, 9, 12, 11, 14, 13, 15, 16, 17, 18, 19, 21, 20, 22,
     ];
     assert_eq!(pairs, expected);
+    assert_eq!(without_partner(&names, &pairs), [18, 19]);
     let (point, rotation) = (
         DVec3::new(1.0, 2.0, 3.0),
         DQuat::from_xyzw(0.1, 0.2, 0.3, 0.9).normalize(),

@@ -230,6 +230,11 @@ impl ManifestEntry {
         self.input_sha256.as_deref() == Some(input_sha256) && self.is_made_with(options)
     }
 
+    /// Whether it is a table with rows of many inputs, of which the manifest names the directory.
+    pub(crate) fn is_of_directory(&self) -> bool {
+        self.options.ends_with(" into=parquet")
+    }
+
     /// As [`ManifestEntry::is_made_from`], of any input.
     pub(crate) fn is_made_with(&self, options: &str) -> bool {
         self.options == options && self.is_of_this_program()

@@ -433,8 +433,7 @@ impl<'a> InputHashes<'a> {
         let mut absent = AbsentFiles::default();
         for &entry in entries {
             let is_read = !self.inputs.get(&*entry.input).is_some_and(Option::is_none);
-            // A table has rows of many inputs, of which the manifest names the directory.
-            if is_read || Path::new(&entry.input).is_dir() {
+            if is_read || entry.is_of_directory() && Path::new(&entry.input).is_dir() {
                 continue;
             }
             match InputPresence::of_entry(entry) {

@@ -10,7 +10,8 @@ use tumble::trees::{BodyOrder, Siblings};
 use tumble::{Device, Engine, FrameRate, SampleTimes};
 use tumble_formats::format::Format;
 use tumble_formats::learning::{
-    ContactLimits, FeatureRequest, FeatureSet, Ground, WorldFrames, feature_arrays, write_features,
+    ContactLimits, FeatureRequest, FeatureSet, Ground, WorldFrames, feature_arrays, mirror_pairs,
+    without_partner, write_features,
 };
 use tumble_formats::motion::{Joint, Motion};
 use tumble_formats::retarget::{Role, recognise};
@@ -153,12 +154,11 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     pipeline.finish()
 }
 
-/// Warns where HumanML3D's numbers would mean another thing than those of its models: other frames or another unit.
-fn warn_of_other_units(name: &str, rate: FrameRate, poses: &WorldFrames) {
+/// Warns where HumanML3D's numbers would mean another thing than those of its models, because they are steps from frame to
+/// frame.
+fn warn_of_other_rate(name: &str, rate: FrameRate) {
     /// Frames a second of HumanML3D.
     const RATE: u64 = 20;
-    /// The distance between the joints of a person that are furthest apart along an axis, in metres.
-    const PERSON: RangeInclusive<f64> = 0.5..=3.0;
     if FrameRate::new(RATE, 1).is_ok_and(|of_set| of_set != rate) {
         words::warning(&format!(
             "{name}: HumanML3D has {RATE} frames a second, and its numbers are steps from frame to frame; these are of \
@@ -166,14 +166,32 @@ fn warn_of_other_units(name: &str, rate: FrameRate, poses: &WorldFrames) {
             rate.in_words()
         ));
     }
+}
+
+/// Warns of bodies that are too small or too large for the metres of a set.
+fn warn_of_other_unit(name: &str, set: &str, poses: &WorldFrames) {
+    /// The distance between the joints of a person that are furthest apart along an axis, in metres.
+    const PERSON: RangeInclusive<f64> = 0.5..=3.0;
     let first = &poses.positions[..poses.names.len().min(poses.positions.len())];
     let low = first.iter().copied().reduce(DVec3::min);
     let high = first.iter().copied().reduce(DVec3::max);
     let size = low.zip(high).map(|(low, high)| (high - low).max_element());
     if let Some(size) = size.filter(|size| !PERSON.contains(size)) {
         words::warning(&format!(
-            "{name}: HumanML3D is in metres, and the body is {} units tall; is it in another unit? (--scale)",
+            "{name}: {set} is in metres, and the body is {} units tall; is it in another unit? (--scale)",
             words::decimals(size)
+        ));
+    }
+}
+
+/// Warns of joints that name a side, but are mirrored in place.
+fn warn_of_lost_partners(name: &str, names: &[String]) {
+    let alone = without_partner(names, &mirror_pairs(names));
+    if let Some(&first) = alone.first() {
+        words::warning(&format!(
+            "{name}: mirrored in place: {} with the name of a side and no partner on the other (the first: {})",
+            words::count(alone.len(), "joint"),
+            names[first]
         ));
     }
 }
@@ -234,7 +252,18 @@ impl Arguments {
             check_rest(name, &clip)?;
         }
         if self.sets.contains(&FeatureSet::Humanml3d) {
-            warn_of_other_units(name, rate, &poses);
+            warn_of_other_rate(name, rate);
+        }
+        for (set, of_set) in [
+            (FeatureSet::Humanml3d, "HumanML3D"),
+            (FeatureSet::Kimodo, "Kimodo"),
+        ] {
+            if self.sets.contains(&set) {
+                warn_of_other_unit(name, of_set, &poses);
+            }
+        }
+        if self.sets.contains(&FeatureSet::Mirror) {
+            warn_of_lost_partners(name, &poses.names);
         }
         let failed =
             |error: &dyn std::fmt::Display| Failure::new(ALL_INPUTS, format!("{name}: {error}"));

@@ -33,20 +33,45 @@ const SIDES: [[&str; 2]; 9] = [
 ];
 
 /// The partner of each name on the other side, by indices; a name without a partner is its own. Sides are words in
-/// names: `left_hip`, `RightArm`, `foot_l`, `Arm.L`, `L_Foot`, `Bip01 L Thigh`, `kLeftElbow`.
+/// names: `left_hip`, `RightArm`, `foot_l`, `Arm.L`, `L_Foot`, `Bip01 L Thigh`, `kLeftElbow`, or an initial: `LThumb`.
 #[must_use]
 pub fn mirror_pairs<T: AsRef<str>>(names: &[T]) -> Vec<usize> {
-    let index_of = |name: &str| names.iter().position(|other| other.as_ref() == name);
+    let index_of = |name: String| names.iter().position(|other| other.as_ref() == name);
     let partner = |name: &str| {
-        let others = SIDES
-            .iter()
-            .flat_map(|&[left, right]| [(left, right), (right, left)]);
-        let mut renamed = others.filter_map(|(side, other)| swapped(name, side, other));
-        renamed.find_map(|renamed| index_of(&renamed))
+        let mut renamed = on_other_side(name).chain(by_initial(name));
+        renamed.find_map(index_of)
     };
     let names = names.iter().enumerate();
     let pairs = names.map(|(index, name)| partner(name.as_ref()).unwrap_or(index));
     pairs.collect()
+}
+
+/// The indices of names with a word for a side that have no partner among these pairs. Initials do not count: many words
+/// begin with L or R.
+#[must_use]
+pub fn without_partner<T: AsRef<str>>(names: &[T], pairs: &[usize]) -> Vec<usize> {
+    let is_alone = |&index: &usize| {
+        let mut renamed = on_other_side(names[index].as_ref());
+        pairs[index] == index && renamed.next().is_some()
+    };
+    (0..names.len()).filter(is_alone).collect()
+}
+
+/// The name with a word for a side exchanged, for each such word.
+fn on_other_side(name: &str) -> impl Iterator<Item = String> {
+    let sides = SIDES.iter();
+    let both = sides.flat_map(|&[left, right]| [(left, right), (right, left)]);
+    both.filter_map(move |(side, other)| swapped(name, side, other))
+}
+
+/// The name with the initial of the other side, before a capital.
+fn by_initial(name: &str) -> Option<String> {
+    let (other, rest) = match name.strip_prefix('L') {
+        Some(rest) => ('R', rest),
+        None => ('L', name.strip_prefix('R')?),
+    };
+    let is_initial = rest.starts_with(char::is_uppercase);
+    is_initial.then(|| format!("{other}{rest}"))
 }
 
 /// The name with another side, if it has that word between other words.
