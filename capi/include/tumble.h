@@ -369,6 +369,47 @@ typedef uint32_t TumbleSampling;
 #endif // __cplusplus
 
 /*
+ Commands of an application that use the memory of a result.
+ */
+enum TumbleCommandUsers
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+  /*
+   All commands.
+   */
+  TUMBLE_COMMAND_USERS_ANY = 0,
+  /*
+   Compute shaders.
+   */
+  TUMBLE_COMMAND_USERS_KERNELS = 1,
+  /*
+   Copies, fills and updates of buffers.
+   */
+  TUMBLE_COMMAND_USERS_COPIES = 2,
+  /*
+   Compute shaders, copies, fills and updates.
+   */
+  TUMBLE_COMMAND_USERS_KERNELS_AND_COPIES = 3,
+  /*
+   The host.
+   */
+  TUMBLE_COMMAND_USERS_HOST = 4,
+  /*
+   Vertex shaders, and vertex buffers: the queue must support graphics.
+   */
+  TUMBLE_COMMAND_USERS_VERTEX_SHADERS = 5,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum TumbleCommandUsers TumbleCommandUsers;
+#else
+typedef uint32_t TumbleCommandUsers;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/*
  Matrices of a crowd in a buffer that become those of a later stage, in place. The application may have changed
  them before.
  */
@@ -552,6 +593,12 @@ typedef struct TumbleSampler TumbleSampler;
  of threads may use it at the same time.
  */
 typedef struct TumbleSet TumbleSet;
+
+/*
+ A timed target: everything that is needed to record samples of a clip at other times in each frame, and the range of
+ the application's buffer that receives them.
+ */
+typedef struct TumbleTimedTarget TumbleTimedTarget;
 
 /*
  Options for opening a device. If all members except `size` are 0, they have their defaults.
@@ -981,6 +1028,33 @@ typedef struct TumbleCrowdFade {
    */
   float to;
 } TumbleCrowdFade;
+
+/*
+ An event that a layer of an instance passed. This structure has no `size`, because calls write arrays of it; it will
+ not change.
+ */
+typedef struct TumblePassedEvent {
+  /*
+   The clock's time in ticks at which the layer reached the event.
+   */
+  uint64_t clock;
+  /*
+   The index of the instance, from 0.
+   */
+  size_t instance;
+  /*
+   The index of the layer in the instance, from 0.
+   */
+  size_t layer;
+  /*
+   The event's index in the library, from 0.
+   */
+  size_t event;
+  /*
+   The weight of the layer now, 0 to 1.
+   */
+  float weight;
+} TumblePassedEvent;
 
 #ifdef __cplusplus
 extern "C" {
@@ -1645,6 +1719,61 @@ TumbleResult tumble_clip_record(const struct TumbleClipTarget *target,
 TumbleResult tumble_clip_target_free(struct TumbleClipTarget *target);
 
 /*
+ Prepares a request of a clip for recording at times that are given when it is recorded: for a clip at another time
+ in each frame, without a submission.
+
+ The request's own times only say how many samples of each track are recorded: for one pose, one listed time. The
+ buffer and its range are as for `tumble_clip_target_new`. The application frees the target with
+ `tumble_timed_target_free` before it destroys the buffer or the device.
+
+ # Errors
+ As `tumble_clip_target_new`.
+
+ # Safety
+ As for `tumble_clip_target_new`.
+ */
+TumbleResult tumble_timed_target_new(const struct TumbleClip *clip,
+                                     const struct TumbleRequest *request,
+                                     uint64_t buffer,
+                                     uint64_t offset,
+                                     uint64_t size,
+                                     struct TumbleTimedTarget **target);
+
+/*
+ Records an evaluation at `times`, which are in seconds, into the application's command buffer `commands`, a
+ `VkCommandBuffer`. The times are those of all tracks; there must be as many as the request has samples.
+
+ The result starts `offset` bytes after the start of the target's range, a multiple of the bytes of a value, and has
+ the bits that `tumble_clip_evaluate` gives at listed times. Nothing is submitted or waited for. The commands contain
+ about 28 bytes for each sample of a track. Barriers are included, as for `tumble_clip_record`. Several recordings of a
+ target may be in flight on one queue. Commands that are submitted again evaluate the same times.
+
+ # Errors
+ - `TUMBLE_RESULT_WRONG_SIZE` if the result does not fit there or `offset` is not aligned.
+ - `TUMBLE_RESULT_INVALID_INPUT` if there is another number of times, or a time is not finite.
+ - `TUMBLE_RESULT_OUT_OF_MEMORY` if there is not enough memory.
+
+ After any error nothing is recorded.
+
+ # Safety
+ `times` must have `time_count` numbers. The command buffer must be as for `tumble_clip_record`, and nothing else may
+ use it during the call.
+ */
+TumbleResult tumble_timed_target_record(const struct TumbleTimedTarget *target,
+                                        void *commands,
+                                        uint64_t offset,
+                                        const double *times,
+                                        size_t time_count);
+
+/*
+ Frees a timed target. Does nothing if `target` is null.
+
+ # Safety
+ All work that was recorded with the target must have ended, and none may be submitted later.
+ */
+TumbleResult tumble_timed_target_free(struct TumbleTimedTarget *target);
+
+/*
  Returns the size of a pass's result in bytes: 16 for each sample of each track, or 32 for
  `TUMBLE_PASS_OPERATION_WORLD`, whose result is a rotation `x y z w` and a position `x y z 0` each.
 
@@ -1798,8 +1927,8 @@ TumbleResult tumble_set_scales(struct TumbleSet *set,
  `tumble_engine_free`. `options` may be null for the defaults.
 
  These calls submit to the queue: this one, `tumble_upload`, `tumble_evaluate`, `tumble_clip_evaluate`,
- `tumble_clip_evaluate_to_buffer`, `tumble_request_evaluate`, `tumble_clip_target_new`, `tumble_pass_to_buffer`,
- `tumble_pass_target_new`, `tumble_crowd_new`, `tumble_crowd_target_new`, `tumble_crowd_stage_target_new`,
+ `tumble_clip_evaluate_to_buffer`, `tumble_request_evaluate`, `tumble_clip_target_new`, `tumble_timed_target_new`,
+ `tumble_pass_to_buffer`, `tumble_pass_target_new`, `tumble_crowd_new`, `tumble_crowd_target_new`, `tumble_crowd_stage_target_new`,
  `tumble_crowd_evaluate`, `tumble_crowd_evaluate_half` and `tumble_crowd_submit`.
  All others do not. Without `lock_queue`, the application must not use the queue while one of them runs. The simplest
  solution is a queue that only the library uses, if the device has several. Any number of engines may be created on
@@ -2192,6 +2321,54 @@ TumbleResult tumble_crowd_get_fade(const struct TumbleCrowd *crowd,
                                    bool *fades);
 
 /*
+ Adds an event to a clip of a library: a moment such as a step or the throw of a ball, `tick` ticks after the clip's
+ start, up to its length. Crowds that exist already do not have it.
+
+ `name` may be null: then the event has none. Several events may have one name. `event` receives the event's index; it
+ may be null.
+
+ # Errors
+ - `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such clip.
+ - `TUMBLE_RESULT_INVALID_ARGUMENT` if the tick is after the clip's end, or the name is not UTF-8.
+
+ # Safety
+ `name` must be null or a text that ends with a zero byte, and `event` null or point to memory for a number.
+ */
+TumbleResult tumble_crowd_library_push_event(struct TumbleCrowdLibrary *library,
+                                             size_t clip,
+                                             uint32_t tick,
+                                             const char *name,
+                                             size_t *event);
+
+/*
+ Returns the events that the layers of all instances passed after the time `since` of the clock, up to its current
+ time: in the order of the times at which they were passed, then of instances, layers and events.
+
+ `events` has memory for `capacity` events, and `count` receives the number of events. If there are more events than
+ `capacity`, only `count` is written, and the call returns `TUMBLE_RESULT_WRONG_SIZE`: call again with more memory.
+ With `capacity` 0, `events` may be null.
+
+ A layer passes an event when its time in the clip reaches the event's tick, in either direction, and in a loop once in
+ each round. Times are whole ticks, so that one large step passes the same events as many small ones. The clips that
+ the layers play now count, so call this after the clock was moved and before layers get other clips. Layers with
+ weight 0 pass events, too.
+
+ # Errors
+ - `TUMBLE_RESULT_WRONG_SIZE` if there are more events than `capacity`.
+ - `TUMBLE_RESULT_INVALID_ARGUMENT` if `since` is later than the clock.
+ - `TUMBLE_RESULT_OUT_OF_MEMORY` if there is not enough memory for the list.
+
+ # Safety
+ `events` must have memory for `capacity` structures, and `count` must point to memory for a number; nothing else may
+ use them during the call.
+ */
+TumbleResult tumble_crowd_passed_events(const struct TumbleCrowd *crowd,
+                                        uint64_t since,
+                                        struct TumblePassedEvent *events,
+                                        size_t capacity,
+                                        size_t *count);
+
+/*
  Limits evaluations to a list of `count` instances, for example those that a camera sees.
 
  A result then has the rows of these instances only, in the list's order, with the same bits as among all
@@ -2338,6 +2515,39 @@ TumbleResult tumble_crowd_wait_half(struct TumbleCrowd *crowd,
                                     size_t output_count);
 
 /*
+ Converts matrices of `TUMBLE_CROWD_VALUES_LOCAL` to those of `TUMBLE_CROWD_VALUES_MODEL`, in place, with the bits of
+ a crowd that evaluates `TUMBLE_CROWD_VALUES_MODEL` directly.
+
+ Before, the application may change the local matrices, for example by inverse kinematics. `poses` are 12 numbers for
+ each joint of each instance, in the order of results, of any number of instances; `count` is the number of floats.
+ Several threads may convert a part each. `tumble_crowd_stage_target_new` is the same on a device.
+
+ # Errors
+ `TUMBLE_RESULT_WRONG_SIZE` if `count` is not a whole number of instances: 12 × the library's joints each.
+
+ # Safety
+ `poses` must have `count` floats, which nothing else uses during the call.
+ */
+TumbleResult tumble_crowd_library_local_to_model(const struct TumbleCrowdLibrary *library,
+                                                 float *poses,
+                                                 size_t count);
+
+/*
+ Converts matrices of `TUMBLE_CROWD_VALUES_MODEL` to those of `TUMBLE_CROWD_VALUES_SKINNING`, in place, as
+ `tumble_crowd_library_local_to_model`.
+
+ # Errors
+ - `TUMBLE_RESULT_WRONG_SIZE` if `count` is not a whole number of instances.
+ - `TUMBLE_RESULT_WRONG_STATE` if the library has no inverse bind matrices.
+
+ # Safety
+ As for `tumble_crowd_library_local_to_model`.
+ */
+TumbleResult tumble_crowd_library_model_to_skinning(const struct TumbleCrowdLibrary *library,
+                                                    float *poses,
+                                                    size_t count);
+
+/*
  Prepares the recording of evaluations of a crowd, whose results go to a range of the application's Vulkan buffer.
 
  Kernels are compiled and memory is allocated here, not when a frame is recorded. The crowd's engine must have been
@@ -2418,6 +2628,24 @@ TumbleResult tumble_crowd_stage_target_new(const struct TumbleCrowd *crowd,
 TumbleResult tumble_crowd_record(struct TumbleCrowd *crowd,
                                  const struct TumbleCrowdTarget *target,
                                  void *commands);
+
+/*
+ As `tumble_crowd_record`, but the barriers order the evaluation only with the commands that are named: it waits for
+ those of `before`, and those of `after` wait for it. Both are `TumbleCommandUsers`. Earlier evaluations of the crowd
+ are always waited for. Waiting for fewer kinds of commands takes less time.
+
+ # Errors
+ As `tumble_crowd_record`; also `TUMBLE_RESULT_INVALID_ARGUMENT` if a constant is unknown.
+
+ # Safety
+ As for `tumble_crowd_record`. In addition, the application must have its own barriers for all other commands that use
+ the result's memory.
+ */
+TumbleResult tumble_crowd_record_between(struct TumbleCrowd *crowd,
+                                         const struct TumbleCrowdTarget *target,
+                                         void *commands,
+                                         uint32_t before,
+                                         uint32_t after);
 
 /*
  Marks all layers as unknown to the device, so that the next evaluation writes all of them. Call it if a recorded

@@ -28,6 +28,7 @@ struct Free {
     void operator()(TumbleClip *it) const { (void)tumble_clip_free(it); }
     void operator()(TumbleSampler *it) const { (void)tumble_sampler_free(it); }
     void operator()(TumbleClipTarget *it) const { (void)tumble_clip_target_free(it); }
+    void operator()(TumbleTimedTarget *it) const { (void)tumble_timed_target_free(it); }
     void operator()(TumblePassTarget *it) const { (void)tumble_pass_target_free(it); }
     void operator()(TumbleCrowdLibrary *it) const { (void)tumble_crowd_library_free(it); }
     void operator()(TumbleCrowd *it) const { (void)tumble_crowd_free(it); }

@@ -52,7 +52,7 @@ pub(crate) unsafe fn list<'a, T: Copy>(
     Ok(unsafe { std::slice::from_raw_parts(pointer, count) })
 }
 
-/// Number types for which every bit pattern is valid.
+/// Numbers, and structures of them, for which every bit pattern is valid.
 pub(crate) trait Number: Copy {}
 
 impl Number for f32 {}

@@ -26,5 +26,6 @@ pub mod set_vectors;
 mod skeleton;
 #[cfg(test)]
 mod tests;
+pub mod timed;
 pub mod version;
 pub mod vulkan;

@@ -63,7 +63,7 @@ impl TumbleRequest {
     ///
     /// # Safety
     /// The pointer must be null or point to such a structure, whose pointers are null or as its members say.
-    unsafe fn read<T>(
+    pub(crate) unsafe fn read<T>(
         pointer: *const Self,
         clip: &Clip,
         work: impl FnOnce(Request<'_>) -> Result<T, Failure>,

@@ -161,6 +161,8 @@ impl From<CrowdError> for Failure {
             | CrowdError::Speed { .. }
             | CrowdError::Wrap { .. }
             | CrowdError::Seconds { .. }
+            | CrowdError::EventTick { .. }
+            | CrowdError::EventsSince { .. }
             | CrowdError::OtherDevice => TumbleResult::InvalidArgument,
             _ => TumbleResult::InvalidInput,
         };

@@ -209,8 +209,8 @@ pub(crate) fn buffer_range(
 /// `tumble_engine_free`. `options` may be null for the defaults.
 ///
 /// These calls submit to the queue: this one, `tumble_upload`, `tumble_evaluate`, `tumble_clip_evaluate`,
-/// `tumble_clip_evaluate_to_buffer`, `tumble_request_evaluate`, `tumble_clip_target_new`, `tumble_pass_to_buffer`,
-/// `tumble_pass_target_new`, `tumble_crowd_new`, `tumble_crowd_target_new`, `tumble_crowd_stage_target_new`,
+/// `tumble_clip_evaluate_to_buffer`, `tumble_request_evaluate`, `tumble_clip_target_new`, `tumble_timed_target_new`,
+/// `tumble_pass_to_buffer`, `tumble_pass_target_new`, `tumble_crowd_new`, `tumble_crowd_target_new`, `tumble_crowd_stage_target_new`,
 /// `tumble_crowd_evaluate`, `tumble_crowd_evaluate_half` and `tumble_crowd_submit`.
 /// All others do not. Without `lock_queue`, the application must not use the queue while one of them runs. The simplest
 /// solution is a queue that only the library uses, if the device has several. Any number of engines may be created on

@@ -41,6 +41,7 @@ fn the_header_is_what_the_sources_say() {
         "sampler",
         "scalars",
         "request",
+        "timed",
         "pass",
         "set_vectors",
         "vulkan",
@@ -49,8 +50,10 @@ fn the_header_is_what_the_sources_say() {
         "crowd/layer",
         "crowd/player",
         "crowd/fade",
+        "crowd/events",
         "crowd/visible",
         "crowd/output",
+        "crowd/stages",
         "crowd/target",
     ];
     for source in sources {

@@ -12,6 +12,7 @@ use tumble_capi::crowd::layer::TumbleCrowdLayer;
 use tumble_capi::crowd::library::*;
 use tumble_capi::crowd::output::*;
 use tumble_capi::crowd::player::*;
+use tumble_capi::crowd::stages::*;
 use tumble_capi::crowd::target::*;
 use tumble_capi::engine::*;
 use tumble_capi::interpolation::*;
@@ -19,6 +20,7 @@ use tumble_capi::request::*;
 use tumble_capi::result::*;
 use tumble_capi::samples::*;
 use tumble_capi::set::*;
+use tumble_capi::timed::*;
 use tumble_capi::vulkan::*;
 
 use crate::application::{Application, Commands};
@@ -349,6 +351,26 @@ fn stages_are_recorded_into_an_applications_commands() {
     go_on(expected, 0);
     let expected_bits = evaluated(expected, model, false);
     let size = expected_bits.len() as u64;
+    // The stage on the host.
+    let mut poses: Vec<f32> = bytemuck::pod_collect_to_vec(&evaluated(expected, local, false));
+    let count = poses.len();
+    let on_host = |poses: &mut [f32], count| {
+        let poses = poses.as_mut_ptr();
+        // SAFETY: at least as many floats, or the call is refused.
+        unsafe { tumble_crowd_library_local_to_model(library, poses, count) }
+    };
+    done(on_host(&mut poses, count));
+    assert!(bytemuck::cast_slice::<f32, u8>(&poses) == expected_bits);
+    let part = on_host(&mut poses, count - 1);
+    fails(part, TumbleResult::WrongSize, "no multiple of 36");
+    // SAFETY: as many floats.
+    let unbound =
+        unsafe { tumble_crowd_library_model_to_skinning(library, poses.as_mut_ptr(), count) };
+    fails(
+        unbound,
+        TumbleResult::WrongState,
+        "no inverse bind matrices",
+    );
     let (buffer, memory) = application.buffer(size);
     let [mut evaluation, mut stage] = [null_mut(); 2];
     done(target(
@@ -379,6 +401,22 @@ fn stages_are_recorded_into_an_applications_commands() {
             // SAFETY: the commands are in recording, and submitted below.
             done(unsafe { tumble_crowd_record(recorded, target, pointer(commands)) });
         }
+    });
+    commands.run(&[frame]);
+    assert!(application.bytes(memory, size) == expected_bits);
+    // Barriers only for the commands that are named.
+    let between = |target, commands, before, after| {
+        // SAFETY: the commands are in recording, and submitted below, or the call is refused.
+        unsafe { tumble_crowd_record_between(recorded, target, commands, before, after) }
+    };
+    let [any, kernels] =
+        [TumbleCommandUsers::Any, TumbleCommandUsers::Kernels].map(|users| users as u32);
+    let frame = commands.recorded(|commands| {
+        let commands = pointer(commands);
+        let unknown = between(evaluation, commands, any, 6);
+        fails(unknown, argument, "`after` is 6; its constants are 0 to 5");
+        done(between(evaluation, commands, any, kernels));
+        done(between(stage, commands, kernels, any));
     });
     commands.run(&[frame]);
     assert!(application.bytes(memory, size) == expected_bits);
@@ -634,6 +672,7 @@ fn clips_are_recorded_into_an_applications_commands() {
                 application.device.free_memory(memory, None);
             }
         }
+        record_at_new_times(&application, recorded, expected);
         done(tumble_clip_free(recorded));
         done(tumble_clip_free(expected));
     }
@@ -764,6 +803,71 @@ fn clips_are_recorded_into_an_applications_commands() {
 }
 
 /// The loader and the instance are asked whether handles belong to each other, as far as they know.
+/// A clip at a new time in each frame, recorded without a submission, has the bits of listed times.
+fn record_at_new_times(
+    application: &Application,
+    recorded: *const TumbleClip,
+    expected: *const TumbleClip,
+) {
+    let listed = |times: &[f64]| TumbleSamples {
+        size: size_of::<TumbleSamples>(),
+        sampling: TumbleSampling::Times as u32,
+        times: times.as_ptr(),
+        time_count: times.len(),
+        // SAFETY: numbers and null are zeros.
+        ..unsafe { std::mem::zeroed() }
+    };
+    let request = |samples: &TumbleSamples| TumbleRequest {
+        size: size_of::<TumbleRequest>(),
+        samples,
+        // SAFETY: numbers and null are zeros.
+        ..unsafe { std::mem::zeroed() }
+    };
+    let some_time = listed(&[0.0]);
+    let times = [0.3, 1.25, -4.0];
+    let bits = times.map(|time| requested(expected, &request(&listed(&[time]))));
+    let size = bits[0].len() as u64;
+    let (buffer, memory) = application.buffer(3 * size);
+    let mut target = null_mut();
+    let (one_sample, handle) = (request(&some_time), buffer.as_raw());
+    // SAFETY: the buffer is the application's, which frees the target first; room for the handle.
+    done(unsafe {
+        tumble_timed_target_new(
+            recorded,
+            &raw const one_sample,
+            handle,
+            0,
+            3 * size,
+            &raw mut target,
+        )
+    });
+    let record = |commands, offset, times: &[f64]| {
+        // SAFETY: the commands are in recording, or the call is refused before they are used.
+        unsafe { tumble_timed_target_record(target, commands, offset, times.as_ptr(), times.len()) }
+    };
+    let commands = Commands::new(application);
+    let all = commands.recorded(|commands| {
+        let commands = pointer(commands);
+        let two = record(commands, 0, &[0.0, 1.0]);
+        fails(two, TumbleResult::InvalidInput, "2");
+        let infinite = record(commands, 0, &[f64::INFINITY]);
+        fails(infinite, TumbleResult::InvalidInput, "inf");
+        let beyond = record(commands, 3 * size, &[0.0]);
+        fails(beyond, TumbleResult::WrongSize, "does not fit");
+        for (frame, time) in (0_u64..).zip(times) {
+            done(record(commands, frame * size, &[time]));
+        }
+    });
+    commands.run(&[all]);
+    assert!(application.bytes(memory, 3 * size) == bits.concat());
+    // SAFETY: nothing is in flight.
+    unsafe {
+        done(tumble_timed_target_free(target));
+        application.device.destroy_buffer(buffer, None);
+        application.device.free_memory(memory, None);
+    }
+}
+
 #[test]
 fn handles_that_do_not_belong_together_are_refused() {
     if vulkan_devices().is_empty() {

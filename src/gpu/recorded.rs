@@ -177,6 +177,20 @@ pub enum CommandUsers {
     KernelsAndCopies,
     /// The host.
     Host,
+    /// Vertex shaders, and vertex buffers: the queue must support graphics.
+    VertexShaders,
+}
+
+impl CommandUsers {
+    /// All kinds of users.
+    pub const ALL: [Self; 6] = [
+        Self::Any,
+        Self::Kernels,
+        Self::Copies,
+        Self::KernelsAndCopies,
+        Self::Host,
+        Self::VertexShaders,
+    ];
 }
 
 /// The commands of an application that a recorded target is ordered with. The target waits for the earlier commands and
@@ -204,7 +218,9 @@ impl CommandScopes {
             CommandUsers::Kernels | CommandUsers::Copies | CommandUsers::KernelsAndCopies => {
                 CommandUsers::KernelsAndCopies
             }
-            CommandUsers::Any | CommandUsers::Host => CommandUsers::Any,
+            CommandUsers::Any | CommandUsers::Host | CommandUsers::VertexShaders => {
+                CommandUsers::Any
+            }
         };
         Self { before, ..self }
     }
@@ -227,6 +243,7 @@ impl From<CommandUsers> for Users {
             CommandUsers::Copies => Self::Copy,
             CommandUsers::KernelsAndCopies => Self::KernelAndCopy,
             CommandUsers::Host => Self::Host,
+            CommandUsers::VertexShaders => Self::VertexShader,
         }
     }
 }
@@ -354,6 +371,11 @@ fn scope(users: Users, writes: bool) -> (vk::PipelineStageFlags, vk::AccessFlags
         }
         (Users::Host, true) => (S::HOST, A::HOST_WRITE),
         (Users::Host, false) => (S::HOST, A::HOST_READ),
+        (Users::VertexShader, true) => (S::VERTEX_SHADER, A::SHADER_WRITE),
+        (Users::VertexShader, false) => (
+            S::VERTEX_INPUT | S::VERTEX_SHADER,
+            A::VERTEX_ATTRIBUTE_READ | A::UNIFORM_READ | A::SHADER_READ | A::SHADER_WRITE,
+        ),
         (Users::Any, true) => (S::ALL_COMMANDS, A::MEMORY_WRITE),
         (Users::Any, false) => (S::ALL_COMMANDS, A::MEMORY_READ | A::MEMORY_WRITE),
     }
@@ -468,13 +490,14 @@ mod tests {
     /// Memory that a pass or a crowd has of its own was used by its own kernels and copies.
     #[test]
     fn earlier_recordings_of_a_target_are_waited_for() {
-        use CommandUsers::{Any, Copies, Host, Kernels, KernelsAndCopies};
+        use CommandUsers::{Any, Copies, Host, Kernels, KernelsAndCopies, VertexShaders};
         for (before, waited_for) in [
             (Any, Any),
             (Kernels, KernelsAndCopies),
             (Copies, KernelsAndCopies),
             (KernelsAndCopies, KernelsAndCopies),
             (Host, Any),
+            (VertexShaders, Any),
         ] {
             let scopes = CommandScopes {
                 before,
@@ -498,6 +521,11 @@ mod tests {
             [Users::Copy, Users::KernelAndCopy]
         );
         assert_eq!(of(kernel, any), [kernel, Users::Host]);
+        let drawn = CommandScopes::default().with_after(CommandUsers::VertexShaders);
+        assert_eq!(
+            drawn.of_barrier([kernel, any]),
+            [kernel, Users::VertexShader]
+        );
         assert_eq!(of(kernel, Users::Copy), [kernel, Users::Copy]);
         assert_eq!(CommandScopes::default().of_barrier([any, any]), [any, any]);
     }

@@ -116,6 +116,7 @@ pub(crate) enum Users {
     Copy,
     KernelAndCopy,
     Host,
+    VertexShader,
     /// All earlier or later work on the queue.
     Any,
 }

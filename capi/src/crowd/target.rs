@@ -3,7 +3,7 @@
 use std::ffi::c_void;
 
 use tumble::crowd::{Crowd, CrowdStage};
-use tumble::vulkan::{CrowdTarget, VulkanBuffer};
+use tumble::vulkan::{CommandScopes, CommandUsers, CrowdTarget, VulkanBuffer};
 
 use crate::arguments::{Out, flag, option, vulkan};
 use crate::crowd::output;
@@ -162,6 +162,59 @@ pub unsafe extern "C" fn tumble_crowd_record(
         let mut state = crowd.lock()?;
         // SAFETY: as the caller promises.
         unsafe { state.inner.record(&target.inner, commands)? };
+        Ok(())
+    })
+}
+
+/// Commands of an application that use the memory of a result.
+#[repr(u32)]
+#[derive(Debug, Clone, Copy)]
+pub enum TumbleCommandUsers {
+    /// All commands.
+    Any = 0,
+    /// Compute shaders.
+    Kernels = 1,
+    /// Copies, fills and updates of buffers.
+    Copies = 2,
+    /// Compute shaders, copies, fills and updates.
+    KernelsAndCopies = 3,
+    /// The host.
+    Host = 4,
+    /// Vertex shaders, and vertex buffers: the queue must support graphics.
+    VertexShaders = 5,
+}
+
+/// As `tumble_crowd_record`, but the barriers order the evaluation only with the commands that are named: it waits for
+/// those of `before`, and those of `after` wait for it. Both are `TumbleCommandUsers`. Earlier evaluations of the crowd
+/// are always waited for. Waiting for fewer kinds of commands takes less time.
+///
+/// # Errors
+/// As `tumble_crowd_record`; also `TUMBLE_RESULT_INVALID_ARGUMENT` if a constant is unknown.
+///
+/// # Safety
+/// As for `tumble_crowd_record`. In addition, the application must have its own barriers for all other commands that use
+/// the result's memory.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn tumble_crowd_record_between(
+    crowd: *mut TumbleCrowd,
+    target: *const TumbleCrowdTarget,
+    commands: *mut c_void,
+    before: u32,
+    after: u32,
+) -> TumbleResult {
+    code(|| {
+        let (crowd, target) = (handle::get(crowd)?, handle::get(target)?);
+        let commands = vulkan(commands, "commands")?;
+        let scopes = CommandScopes::default()
+            .with_before(option(before, &CommandUsers::ALL, "before")?)
+            .with_after(option(after, &CommandUsers::ALL, "after")?);
+        let mut state = crowd.lock()?;
+        // SAFETY: as the caller promises.
+        unsafe {
+            state
+                .inner
+                .record_between(&target.inner, commands, scopes)?;
+        }
         Ok(())
     })
 }

@@ -8,6 +8,7 @@ use tumble::crowd::{CrowdOutput, CrowdValues};
 use super::crowd::*;
 use super::crowd_refusals::{evaluate, small};
 use super::{cpu, fails, one_track};
+use crate::crowd::events::*;
 use crate::crowd::fade::*;
 use crate::crowd::layer::*;
 use crate::crowd::library::*;
@@ -460,4 +461,74 @@ fn weights_fades_and_lists_are_checked() {
         "what is refused changes nothing"
     );
     done(tumble_crowd_free(crowd));
+}
+
+#[test]
+fn passed_events_are_those_of_rust() {
+    let (library, mut rust_library) = libraries();
+    let name = c"step";
+    let event = |clip, tick, event| {
+        // SAFETY: text, and null or room for the number.
+        unsafe { tumble_crowd_library_push_event(library, clip, tick, name.as_ptr(), event) }
+    };
+    let ticks = tumble_crowd_library_clip_ticks(library, 1);
+    for (number, tick) in [ticks / 3, ticks].into_iter().enumerate() {
+        let mut index = 9;
+        done(event(1, tick, &raw mut index));
+        assert_eq!(
+            rust_library
+                .push_event(1, tick, "step")
+                .map(|own| own == index),
+            Ok(true)
+        );
+        assert_eq!(index, number);
+    }
+    let argument = TumbleResult::InvalidArgument;
+    fails(event(1, ticks + 1, null_mut()), argument, "after the clip");
+    fails(event(3, 0, null_mut()), TumbleResult::OutOfRange, "clip 3");
+
+    let engine = cpu();
+    let crowd = c_crowd(engine, library, (3, 1));
+    let rust_engine = tumble::Engine::new(tumble::Device::Cpu).unwrap();
+    let mut rust_crowd = rust_engine.crowd(&rust_library, 3, 1).unwrap();
+    let layer = TumbleCrowdLayer {
+        instance: 2,
+        clip: 1,
+        speed: -1.5,
+        wrap: 1,
+        ..still()
+    };
+    // SAFETY: one structure.
+    done(unsafe { tumble_crowd_set(crowd, &raw const layer, 1) });
+    let played = tumble::crowd::CrowdLayer::new(1)
+        .with_speed(-1.5)
+        .with_wrap(tumble::WrapMode::Loop);
+    rust_crowd.set(2, 0, played).unwrap();
+    done(tumble_crowd_advance(crowd, 7.0));
+    rust_crowd.advance(7.0).unwrap();
+    let expected: Vec<TumblePassedEvent> = (rust_crowd.passed_events(0).unwrap())
+        .into_iter()
+        .map(TumblePassedEvent::from)
+        .collect();
+    assert!(expected.len() > 4, "{expected:?}");
+
+    let passed = |since, events: &mut [TumblePassedEvent], count: *mut usize| {
+        let (memory, capacity) = (events.as_mut_ptr(), events.len());
+        // SAFETY: room for as many events, and null or room for the number.
+        unsafe { tumble_crowd_passed_events(crowd, since, memory, capacity, count) }
+    };
+    let mut count = 0;
+    let none = passed(0, &mut [], &raw mut count);
+    fails(none, TumbleResult::WrongSize, "`capacity` is 0");
+    assert_eq!(count, expected.len());
+    let mut events = vec![expected[1]; count];
+    done(passed(0, &mut events, &raw mut count));
+    assert_eq!(events, expected);
+    let later = passed(u64::MAX, &mut events, &raw mut count);
+    fails(later, argument, "the clock is at");
+    let nowhere = passed(0, &mut events, null_mut());
+    fails(nowhere, TumbleResult::InvalidPointer, "`count` is null");
+    done(tumble_crowd_free(crowd));
+    done(tumble_engine_free(engine));
+    done(tumble_crowd_library_free(library));
 }

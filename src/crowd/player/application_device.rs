@@ -126,7 +126,7 @@ impl Crowd {
     }
 
     /// As [`Crowd::record`], but the barriers order the evaluation only with the commands that `scopes` names: compute
-    /// shaders, copies or the host. Earlier evaluations of the crowd are always waited for.
+    /// shaders, copies, vertex shaders or the host. Earlier evaluations of the crowd are always waited for.
     ///
     /// # Errors
     /// As for [`Crowd::record`].
