@@ -475,12 +475,8 @@ fn passed_events_are_those_of_rust() {
     for (number, tick) in [ticks / 3, ticks].into_iter().enumerate() {
         let mut index = 9;
         done(event(1, tick, &raw mut index));
-        assert_eq!(
-            rust_library
-                .push_event(1, tick, "step")
-                .map(|own| own == index),
-            Ok(true)
-        );
+        let expected = rust_library.push_event(1, tick, "step");
+        assert_eq!(expected, Ok(index));
         assert_eq!(index, number);
     }
     let argument = TumbleResult::InvalidArgument;
