@@ -22,6 +22,7 @@ use crate::arguments::output::{one_of, sequence};
 use crate::arguments::results::{ResultArguments, check_sequence, check_stores_keys, write_keys};
 use crate::batch::pipeline::{ClipWork, EvaluatedResult};
 use crate::batch::preview::PlannedWork;
+use crate::commands::features::axis_name;
 use crate::batch::target::{Destination, ResultTarget, WrittenFile};
 use crate::messages::exit::{ALL_INPUTS, Failure};
 use crate::messages::words;
@@ -281,6 +282,13 @@ impl Arguments {
                     printable(joint)
                 );
                 work.warn(Diagnostic::new(name, Code::RotationsDropped, message));
+            }
+            if let Some(axis) = report.stood_along {
+                let axis = axis_name(axis);
+                words::note(&format!(
+                    "{name}: the body stands along {axis} on average, so it is rotated until y points up (--up-axis states the \
+                     axis of the input)"
+                ));
             }
             if report.are_axes_assumed {
                 let message = "the axes of both skeletons are taken to be the same, because it is not known which joints \
