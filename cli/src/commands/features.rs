@@ -292,7 +292,10 @@ impl Arguments {
                 Ground::Y => 0,
                 Ground::Z => 1,
             }),
-            humanml3d_joints: roles.as_ref().map_err(String::clone).and_then(joints_of_smpl),
+            humanml3d_joints: roles
+                .as_ref()
+                .map_err(String::clone)
+                .and_then(joints_of_smpl),
             rate,
         };
         if let (true, Ok(roles)) = (self.sets.contains(&FeatureSet::Kimodo), &roles) {
@@ -363,7 +366,9 @@ impl Arguments {
                 return Err(Failure::new(ALL_INPUTS, message));
             }
         };
-        words::warning(&format!("{message}, and {option} states that {up} points up"));
+        words::warning(&format!(
+            "{message}, and {option} states that {up} points up"
+        ));
         Ok(())
     }
 
@@ -501,8 +506,7 @@ fn roles_of(clip: &Motion, names: &[String]) -> Result<Roles, String> {
 }
 
 /// For skeletons without the joints of SMPL.
-const REMEDY: &str =
-    "`tumble retarget --onto FILE --bones FILE` carries the motion to a skeleton that has all, such as one of SMPL";
+const REMEDY: &str = "`tumble retarget --onto FILE --bones FILE` carries the motion to a skeleton that has all, such as one of SMPL";
 
 /// The joints of SMPL in its order, by the parts of the body that the joints of a skeleton are; or why there are not all of
 /// them.

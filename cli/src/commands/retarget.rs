@@ -22,8 +22,8 @@ use crate::arguments::output::{one_of, sequence};
 use crate::arguments::results::{ResultArguments, check_sequence, check_stores_keys, write_keys};
 use crate::batch::pipeline::{ClipWork, EvaluatedResult};
 use crate::batch::preview::PlannedWork;
-use crate::commands::features::axis_name;
 use crate::batch::target::{Destination, ResultTarget, WrittenFile};
+use crate::commands::features::axis_name;
 use crate::messages::exit::{ALL_INPUTS, Failure};
 use crate::messages::words;
 

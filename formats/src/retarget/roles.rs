@@ -253,7 +253,9 @@ pub fn standing_axis<P: AsRef<[DVec3]>>(
     };
     let sum: DVec3 = poses.into_iter().map(height).sum();
     let along = |axis: &DVec3| sum.dot(*axis).abs();
-    let (mut axes, by_length) = (DVec3::AXES, |a: &DVec3, b: &DVec3| along(b).total_cmp(&along(a)));
+    let (mut axes, by_length) = (DVec3::AXES, |a: &DVec3, b: &DVec3| {
+        along(b).total_cmp(&along(a))
+    });
     axes.sort_by(by_length);
     let [axis, second, _] = axes;
     // The other axes are those of how it leans.

@@ -520,8 +520,7 @@ impl ClipPair<'_> {
         }
         let lone = names[1].iter().filter(|name| !names[0].contains(name));
         missing[1].extend(lone.map(|name| (*name).to_owned()));
-        let kinds =
-            |pair: &[usize; 2]| [0, 1].map(|side| self.clips[side].scalar(pair[side]).kind);
+        let kinds = |pair: &[usize; 2]| [0, 1].map(|side| self.clips[side].scalar(pair[side]).kind);
         let mut others = pairs.iter().filter(|pair| kinds(pair)[0] != kinds(pair)[1]);
         match others.next() {
             None => Ok((pairs, missing)),
