@@ -95,6 +95,9 @@ pub struct RetargetReport {
     /// The axis along which the source, an SMPL body, stands on average, if the clip does not state what points up and this
     /// is not y. The motion was then rotated, so that y points up.
     pub stood_along: Option<DVec3>,
+    /// The axes along which the source stands in its rest pose and, on average, in the motion, if they differ. Another pose is
+    /// then needed as the rest pose, such as one of the motion ([`RetargetOptions::rest_frame`]).
+    pub rests_along: Option<[DVec3; 2]>,
     /// How far a joint of the source other than the hips moves away from where it rests, in its unit, which is lost.
     pub dropped_translation: f64,
     /// The largest angle in radians between the differences from rest of a joint and of its partner, caused by
@@ -253,6 +256,11 @@ impl<'a> Rig<'a> {
     }
 }
 
+/// Some samples of a motion, up to 64.
+fn some_of(samples: usize) -> impl Iterator<Item = usize> {
+    (0..samples).step_by(samples.div_ceil(64).max(1))
+}
+
 /// The axis that a direction is nearest to.
 fn nearest_axis(direction: DVec3) -> Option<DVec3> {
     let largest = direction.abs().max_element();
@@ -314,7 +322,7 @@ pub fn retarget(
     if let Some(body) = &source.body {
         let found = || {
             let roles = recognise(&from.names, &from.parents).ok()?;
-            let poses = 0..samples.times.len();
+            let poses = some_of(samples.times.len());
             let poses = poses.map(|sample| from.world(|joint| stored(sample, joint)).positions);
             stood_along = standing_axis(&roles, poses).filter(|axis| *axis != DVec3::Y);
             stood_along
@@ -351,6 +359,17 @@ pub fn retarget(
     let found = || {
         Some(axes_of(&to, to_roles.as_ref()?)? * axes_of(&from, from_roles.as_ref()?)?.inverse())
     };
+    let rests_along = || {
+        let roles = from_roles.as_ref()?;
+        let poses = some_of(samples.times.len());
+        let poses = poses.map(|sample| from.world(|joint| local(sample, joint)).positions);
+        let [at_rest, moving] = [
+            standing_axis(roles, [&from.rest.positions])?,
+            standing_axis(roles, poses)?,
+        ];
+        (at_rest != moving).then_some([at_rest, moving])
+    };
+    let rests_along = rests_along();
     let known_axes = options.axes.map(DQuat::normalize).or_else(found);
     let axes = known_axes.unwrap_or(DQuat::IDENTITY);
     let segments = pairs.segments(&to, to_roles.as_ref());
@@ -487,6 +506,7 @@ pub fn retarget(
         axes,
         are_axes_assumed: known_axes.is_none(),
         stood_along,
+        rests_along,
         dropped_translation,
         largest_difference,
         below_ground: ends.below_ground,

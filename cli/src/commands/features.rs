@@ -186,8 +186,8 @@ fn warn_of_other_unit(name: &str, set: &str, poses: &WorldFrames) {
 }
 
 /// Warns of joints that name a side, but are mirrored in place.
-fn warn_of_lost_partners(name: &str, names: &[String]) {
-    let alone = without_partner(names, &mirror_pairs(names));
+pub(crate) fn warn_of_lost_partners(name: &str, names: &[String], pairs: &[usize]) {
+    let alone = without_partner(names, pairs);
     if let Some(&first) = alone.first() {
         words::warning(&format!(
             "{name}: mirrored in place: {} with the name of a side and no partner on the other (the first: {})",
@@ -313,7 +313,7 @@ impl Arguments {
             }
         }
         if self.sets.contains(&FeatureSet::Mirror) {
-            warn_of_lost_partners(name, &poses.names);
+            warn_of_lost_partners(name, &poses.names, &mirror_pairs(&poses.names));
         }
         let failed =
             |error: &dyn std::fmt::Display| Failure::new(ALL_INPUTS, format!("{name}: {error}"));

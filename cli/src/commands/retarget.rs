@@ -290,6 +290,13 @@ impl Arguments {
                      axis of the input)"
                 ));
             }
+            if let Some([at_rest, moving]) = report.rests_along {
+                let [at_rest, moving] = [at_rest, moving].map(axis_name);
+                words::warning(&format!(
+                    "{name}: the body stands along {moving} in the motion and along {at_rest} in the rest pose of its \
+                     skeleton, so the result does not stand upright; --rest-frame takes a pose of the motion as the rest pose"
+                ));
+            }
             if report.are_axes_assumed {
                 let message = "the axes of both skeletons are taken to be the same, because it is not known which joints \
                                are the parts of the body, or where these are at rest; --up-axis rotates the input";
