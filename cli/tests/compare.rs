@@ -1037,6 +1037,15 @@ fn scalars_alone_are_compared() {
     assert_eq!(refused.code, 4, "{}", refused.words);
     let expected = "have 2 and 2 scalars, none of the same name";
     assert!(refused.words.contains(expected), "{}", refused.words);
+    // A difference of an angle and a length has no unit.
+    write("four.csv", "knee.scalar_length,weight.scalar_plain", "1,1");
+    let refused = run(
+        folder,
+        &["compare", "one/s.csv", "four.csv", "--tolerance", "10"],
+    );
+    assert_eq!(refused.code, 4, "{}", refused.words);
+    let expected = "the scalar `knee` is of the kind `angle` in one/s.csv and `length` in four.csv";
+    assert!(refused.words.contains(expected), "{}", refused.words);
 }
 
 /// The joint in the line of the largest angle is the first of the table, also where two joints differ equally.

@@ -146,6 +146,182 @@ pub(crate) fn npy(shape: &str, numbers: &[f64]) -> Vec<u8> {
     bytes
 }
 
+/// Writes an NPZ file with these arrays: names, shapes and numbers.
+fn write_arrays(path: &Path, arrays: &[(&str, String, &[f64])]) {
+    let mut archive = zip::ZipWriter::new(fs::File::create(path).unwrap());
+    for (name, shape, numbers) in arrays {
+        archive
+            .start_file(format!("{name}.npy"), SimpleFileOptions::default())
+            .unwrap();
+        archive.write_all(&npy(shape, numbers)).unwrap();
+    }
+    archive.finish().unwrap();
+}
+
+/// The offsets of an SMPL body's 22 joints, each with its mirror image.
+const BODY: [[f64; 3]; 22] = [
+    [0.0, -0.2, 0.02],
+    [0.07, -0.09, 0.0],
+    [-0.07, -0.09, 0.0],
+    [0.0, 0.11, 0.0],
+    [0.03, -0.38, 0.0],
+    [-0.03, -0.38, 0.0],
+    [0.0, 0.13, 0.0],
+    [-0.01, -0.4, -0.04],
+    [0.01, -0.4, -0.04],
+    [0.0, 0.05, 0.02],
+    [0.02, -0.06, 0.12],
+    [-0.02, -0.06, 0.12],
+    [0.0, 0.21, -0.03],
+    [0.08, 0.12, 0.0],
+    [-0.08, 0.12, 0.0],
+    [0.0, 0.09, 0.05],
+    [0.09, 0.03, 0.0],
+    [-0.09, 0.03, 0.0],
+    [0.26, -0.01, 0.0],
+    [-0.26, -0.01, 0.0],
+    [0.25, 0.0, 0.0],
+    [-0.25, 0.0, 0.0],
+];
+
+/// Writes a body that stands with its feet on the ground and walks forward at 1 m/s, in the layout of AMASS with z up, or with y
+/// up as other programs write it; and its offsets as text.
+pub(crate) fn write_bodies(folder: &Path) {
+    let frames = 31;
+    let [pelvis_y, pelvis_z] = [BODY[0][1], BODY[0][2]];
+    for (name, is_z_up) in [("amass", true), ("y_up", false)] {
+        let (mut poses, mut trans) = (Vec::new(), Vec::new());
+        for frame in 0..frames {
+            let forward = f64::from(frame) / 30.0;
+            let root = if is_z_up {
+                std::f64::consts::FRAC_PI_2
+            } else {
+                0.0
+            };
+            poses.extend([root, 0.0, 0.0]);
+            poses.extend([0.0; 63]);
+            // The pelvis is 0.93 m above the ground, where its toes are.
+            let pelvis = match is_z_up {
+                true => [0.0, -forward, 0.93],
+                false => [0.0, 0.93, forward],
+            };
+            trans.extend([pelvis[0], pelvis[1] - pelvis_y, pelvis[2] - pelvis_z]);
+        }
+        write_arrays(
+            &folder.join(format!("{name}.npz")),
+            &[
+                ("poses", format!("({frames}, 66)"), &poses),
+                ("trans", format!("({frames}, 3)"), &trans),
+                ("mocap_framerate", "()".to_owned(), &[30.0]),
+            ],
+        );
+    }
+    let lines = BODY.map(|[x, y, z]| format!("{x} {y} {z}\n"));
+    fs::write(folder.join("offsets.txt"), lines.concat()).unwrap();
+}
+
+/// Kimodo and HumanML3D have y up, and headings and contacts depend on what points up. Files of bodies do not state it, and
+/// most have z up.
+#[test]
+fn bodies_with_z_up_are_converted_or_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    write_bodies(folder);
+    let features = |file: &str, rest: &str| {
+        let words = format!("features {file} --offsets offsets.txt {rest}");
+        run(folder, &words.split_whitespace().collect::<Vec<_>>())
+    };
+    for set in ["kimodo", "humanml3d", "heading", "contacts"] {
+        let refused = features("amass.npz", &format!("--sets {set} -o z.npz"));
+        let said = format!(
+            "the body stands along z, from its feet to its head, and {set} is computed with y up; --up-axis y"
+        );
+        assert_eq!(refused.code, 3, "{}", refused.words);
+        assert!(refused.words.contains(&said), "{}", refused.words);
+    }
+    for (index, (file, rest, said)) in [
+        ("amass.npz", "--up-axis y", None),
+        ("y_up.npz", "", None),
+        ("y_up.npz", "--vertical y", None),
+        (
+            "amass.npz",
+            "--vertical y",
+            Some("along z, from its feet to its head, and --vertical states that y points up"),
+        ),
+        (
+            "y_up.npz",
+            "--up-axis y",
+            Some("along -z, from its feet to its head, and --up-axis states that y points up"),
+        ),
+        ("amass.npz", "--vertical z", None),
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let set = if rest.ends_with(" z") {
+            "contacts"
+        } else {
+            "kimodo"
+        };
+        let made = features(file, &format!("--sets {set} {rest} -o {index}.npz"));
+        assert_eq!(made.code, 0, "{}", made.words);
+        match said {
+            Some(said) => assert!(made.words.contains(said), "{}", made.words),
+            None => assert!(!made.words.contains("warning"), "{}", made.words),
+        }
+    }
+    let converted = &arrays(&folder.join("0.npz"))["kimodo"].1;
+    let numbers = converted.len() / 31;
+    assert_near(
+        converted,
+        &arrays(&folder.join("1.npz"))["kimodo"].1,
+        1e-6,
+        "converted",
+    );
+    let first = &converted[..numbers];
+    // The height of the hips, the heading, the head, and the axes of the hips.
+    assert_near(&first[1..5], &[0.93, first[2], 1.0, 0.0], 1e-6, "root");
+    assert_near(
+        &first[5 + 3 * 15 + 1..][..1],
+        &[0.93 + 0.11 + 0.13 + 0.05 + 0.21 + 0.09],
+        1e-6,
+        "head",
+    );
+    assert_near(
+        &first[5 + 66..][..6],
+        &[1.0, 0.0, 0.0, 0.0, 1.0, 0.0],
+        1e-6,
+        "axes",
+    );
+    // Differences of frames times the rate: 1 m/s forward.
+    assert_near(
+        &first[5 + 66 + 132..][..3],
+        &[0.0, 0.0, 1.0],
+        1e-5,
+        "velocity",
+    );
+    assert_eq!(arrays(&folder.join("5.npz"))["contacts"].1[10], 1.0);
+}
+
+/// Rotations of Kimodo are those of joints that rest in a T-pose.
+#[test]
+fn kimodo_of_other_rest_poses_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let human = crate::retarget::human(|role| role);
+    let lowered = human.replace("OFFSET 27 0 0", "OFFSET 0 -27 0");
+    let lowered = lowered.replace("OFFSET 28 0 0", "OFFSET 0 -28 0");
+    for (name, text, is_refused) in [("t", human, false), ("lowered", lowered, true)] {
+        fs::write(folder.join(format!("{name}.bvh")), text).unwrap();
+        let words =
+            format!("features {name}.bvh --fps 100 --scale 0.01 --sets kimodo -o {name}.npz");
+        let run = run(folder, &words.split_whitespace().collect::<Vec<_>>());
+        assert_eq!(run.code != 0, is_refused, "{}", run.words);
+        let said = "the direction from `leftUpperArm` to `leftHand` is 90° away from that at rest; `tumble retarget --onto`";
+        assert_eq!(run.words.contains(said), is_refused, "{}", run.words);
+    }
+}
+
 /// The 263 numbers of HumanML3D, of joints in the world.
 #[test]
 fn humanml3d_is_that_of_numpy() {
@@ -161,23 +337,19 @@ fn humanml3d_is_that_of_numpy() {
         .flat_map(|frame| &frame[..3])
         .copied()
         .collect();
-    let mut archive = zip::ZipWriter::new(fs::File::create(folder.join("people.npz")).unwrap());
-    for (name, shape, numbers) in [
-        ("posed_joints", format!("({frames}, 22, 3)"), joints),
-        (
-            "global_rot_mats",
-            format!("({frames}, 22, 3, 3)"),
-            &matrices,
-        ),
-        ("local_rot_mats", format!("({frames}, 22, 3, 3)"), &matrices),
-        ("root_positions", format!("({frames}, 3)"), &roots),
-    ] {
-        archive
-            .start_file(format!("{name}.npy"), SimpleFileOptions::default())
-            .unwrap();
-        archive.write_all(&npy(&shape, numbers)).unwrap();
-    }
-    archive.finish().unwrap();
+    write_arrays(
+        &folder.join("people.npz"),
+        &[
+            ("posed_joints", format!("({frames}, 22, 3)"), joints),
+            (
+                "global_rot_mats",
+                format!("({frames}, 22, 3, 3)"),
+                &matrices,
+            ),
+            ("local_rot_mats", format!("({frames}, 22, 3, 3)"), &matrices),
+            ("root_positions", format!("({frames}, 3)"), &roots),
+        ],
+    );
     let run = line(
         folder,
         "features people.npz --source-fps 20 -m slerp --sets humanml3d,six-rows -o f.npz --json",
@@ -228,6 +400,7 @@ fn velocities_of_skeletons_are_those_of_the_motion() {
         assert!((speed - std::f64::consts::PI).abs() < 1e-3, "{speed}");
         assert_eq!(frame[..3], [0.0; 3]);
     }
+    fs::copy(root().join("data/walk.bvh"), folder.join("walk.bvh")).unwrap();
     // Neither slow nor low.
     assert!(
         found["contacts"]
@@ -241,7 +414,13 @@ fn velocities_of_skeletons_are_those_of_the_motion() {
         ("features a.bvh -o x.npz", "--sets"),
         (
             "features a.bvh --sets humanml3d -o x.npz",
-            "22 joints of SMPL",
+            "humanml3d needs the 22 joints of SMPL: the joints are not those of a known human skeleton: no joint has a known \
+             name for spine, head, ",
+        ),
+        (
+            "features walk.bvh --sets humanml3d -o x.npz",
+            "the skeleton is that of Mixamo, and no joint has a known name for chest, upperChest, leftToes, rightToes, \
+             leftShoulder, rightShoulder; `tumble retarget --onto FILE --bones FILE`",
         ),
         ("features a.bvh --sets heading -o x.bvh", ".npz"),
         ("features a.bvh --sets six -o x.npz", "six-columns"),

@@ -5,6 +5,9 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
 
+use tumble::glam::Quat;
+use tumble_formats::{Format, ReadOptions};
+
 use crate::program::{Run, run, sample_folder, succeed};
 use crate::tree::tree;
 
@@ -761,6 +764,104 @@ fn info_lists_the_values_of_a_pickle() {
         assert!(both.contains(part), "{part}: {both}");
     }
     assert!(refused(at, "info calls.pkl").words.contains("E911"));
+}
+
+/// Mirrored animations of a glTF file keep all else: their names, also where two have one, the weights of morph targets,
+/// and animations that move no joint.
+#[test]
+fn mirrored_animations_keep_weights_and_names() {
+    let temporary = sample_folder();
+    let folder = temporary.path();
+    // Times; rotations of a hip; weights of a target.
+    let half = std::f32::consts::FRAC_1_SQRT_2;
+    let numbers = [
+        0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, half, half, 0.25, 0.75, 0.0, 0.0, 0.0, 1.0, 0.0,
+        0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0f32,
+    ];
+    let bytes: Vec<u8> = numbers
+        .iter()
+        .flat_map(|number| number.to_le_bytes())
+        .collect();
+    fs::write(folder.join("a.bin"), &bytes).unwrap();
+    let accessor = |offset: usize, count: usize, kind: &str| {
+        let bounds = match (offset, kind) {
+            (0, _) => ", \"min\": [0.0], \"max\": [1.0]",
+            (_, "VEC3") => ", \"min\": [0, 0, 0], \"max\": [1, 1, 1]",
+            _ => "",
+        };
+        format!(
+            "{{\"bufferView\": 0, \"byteOffset\": {offset}, \"componentType\": 5126, \"count\": {count}, \"type\": \"{kind}\"{bounds}}}"
+        )
+    };
+    let accessors = [
+        accessor(0, 2, "SCALAR"),
+        accessor(8, 2, "VEC4"),
+        accessor(40, 2, "SCALAR"),
+        accessor(48, 3, "VEC3"),
+        accessor(84, 2, "VEC4"),
+    ];
+    let hips = r#", {"sampler": 1, "target": {"node": 1, "path": "rotation"}},
+        {"sampler": 2, "target": {"node": 2, "path": "rotation"}}"#;
+    let weights = r#"{"sampler": 0, "target": {"node": 3, "path": "weights"}}"#;
+    let file = format!(
+        r#"{{"asset": {{"version": "2.0"}}, "scene": 0, "scenes": [{{"nodes": [0]}}],
+        "nodes": [{{"name": "hips", "children": [1, 2, 3]}}, {{"name": "left_hip", "translation": [1, 0, 0]}},
+            {{"name": "right_hip", "translation": [-1, 0, 0]}}, {{"name": "face", "mesh": 0}}],
+        "meshes": [{{"primitives": [{{"attributes": {{"POSITION": 3}}, "targets": [{{"POSITION": 3}}]}}], "weights": [0],
+            "extras": {{"targetNames": ["smile_left"]}}}}],
+        "animations": [
+            {{"name": "wave", "extras": {{"mood": 1.50}}, "samplers": [{{"input": 0, "output": 2}}, {{"input": 0, "output": 1}}, {{"input": 0, "output": 4}}],
+                "channels": [{weights}{hips}]}},
+            {{"name": "wave", "samplers": [{{"input": 0, "output": 2}}], "channels": [{weights}]}},
+            {{"name": "empty", "samplers": [{{"input": 0, "output": 2}}], "channels": [{{"sampler": 0, "target": {{"path": "weights"}}}}]}}],
+        "accessors": [{}], "bufferViews": [{{"buffer": 0, "byteLength": {length}}}],
+        "buffers": [{{"byteLength": {length}, "uri": "a.bin"}}]}}"#,
+        accessors.join(", "),
+        length = bytes.len(),
+    );
+    fs::write(folder.join("a.gltf"), &file).unwrap();
+    let made = line(folder, "convert a.gltf --mirror x -o b.gltf");
+    let said = "the weights of morph targets are not mirrored: 1 target with the name of a side (the first: smile_left)";
+    assert!(made.words.contains(said), "{}", made.words);
+    assert!(
+        made.words
+            .contains("a.gltf wave: 1 pair of joints change their sides"),
+        "{}",
+        made.words
+    );
+    line(folder, "convert b.gltf --mirror x -o c.gltf");
+    let read = |name: &str| -> serde_json::Value {
+        serde_json::from_slice(&fs::read(folder.join(name)).unwrap()).unwrap()
+    };
+    let [before, mirrored, twice] = ["a.gltf", "b.gltf", "c.gltf"].map(read);
+    for after in [&mirrored, &twice] {
+        let animations = &after["animations"];
+        for index in 0..3 {
+            assert_eq!(
+                animations[index]["name"],
+                before["animations"][index]["name"]
+            );
+        }
+        assert_eq!(animations[0]["extras"]["mood"], 1.5);
+        assert_eq!(animations[0]["channels"][0]["target"]["path"], "weights");
+        assert_eq!(animations[1], before["animations"][1]);
+        assert_eq!(animations[2], before["animations"][2]);
+    }
+    // The left hip turned by 90° about z; now the right one turns the other way.
+    let loaded = Format::open_detected(&folder.join("b.gltf"), &ReadOptions::default()).unwrap();
+    let set = &loaded.clips[0].set;
+    let last = |track: usize| *set.track(track).keys.last().unwrap();
+    assert_eq!(
+        [last(1), last(2)],
+        [Quat::IDENTITY, Quat::from_xyzw(0.0, 0.0, -half, half)]
+    );
+    line(folder, "compare a.gltf c.gltf --tolerance 0 --distance 0");
+    // Without the first animation, no joint moves.
+    let alone = file.replace(hips, "");
+    fs::write(folder.join("d.gltf"), alone).unwrap();
+    line(folder, "convert d.gltf --mirror x -o e.gltf");
+    let [alone, mirrored] = ["d.gltf", "e.gltf"].map(read);
+    assert_eq!(mirrored["animations"], alone["animations"]);
 }
 
 /// The mirror image of a walk is another walk, and the image of this is the first again.

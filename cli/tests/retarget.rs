@@ -230,6 +230,52 @@ fn skeletons_are_recognised_by_their_names() {
     }
 }
 
+/// An SMPL body rests in the axes of its model, with y up, whichever axis points up in its file; and it walks on the ground.
+#[test]
+fn bodies_stand_upright_on_other_skeletons() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    crate::features::write_bodies(folder);
+    fs::write(folder.join("character.bvh"), human(|role| role)).unwrap();
+    for (input, is_found) in [
+        ("amass.npz", true),
+        ("amass.npz --up-axis y", false),
+        ("y_up.npz", false),
+    ] {
+        let words = format!(
+            "retarget {input} --offsets offsets.txt --onto character.bvh --rest same -o a.bvh --overwrite"
+        );
+        let made = line(folder, &words);
+        let said = "the body stands along z on average, so it is rotated until y points up";
+        assert_eq!(made.words.contains(said), is_found, "{}", made.words);
+        let loaded = Format::open_detected(&folder.join("a.bvh"), &ReadOptions::default());
+        let clip = &loaded.unwrap().clips[0];
+        let hips = clip.set.vector_keys(Channel::Translation, 0).unwrap().keys;
+        // Both skeletons stand on their toes at rest, 0.93 and 100 below their hips.
+        for (key, expected) in [
+            (0, Vec3::new(0.0, 100.0, 0.0)),
+            (30, Vec3::new(0.0, 100.0, 100.0 / 0.93)),
+        ] {
+            assert!(
+                hips[key].distance(expected) < 1e-3,
+                "{input}: {}",
+                hips[key]
+            );
+        }
+        for track in clip.set.tracks() {
+            assert!(
+                track.keys.iter().all(|key| key.w.abs() > 1.0 - 1e-6),
+                "{input}"
+            );
+        }
+    }
+    refused(
+        folder,
+        "retarget amass.npz --onto character.bvh -o b.bvh",
+        "--body-model",
+    );
+}
+
 /// Roles, their parents in the list, and their offsets.
 const HUMAN: [(&str, Option<usize>, [f64; 3]); 22] = [
     ("hips", None, [0.0, 100.0, 0.0]),

@@ -3,7 +3,10 @@
 #![cfg(unix)]
 
 use std::fs;
+use std::io::BufReader;
 use std::path::Path;
+
+use tempfile::TempDir;
 
 use crate::program::{self, root};
 
@@ -26,18 +29,24 @@ fn without_durations(text: &str) -> String {
 
 /// Copies the files of a clone that the pages use.
 fn copy_data(folder: &Path) {
-    fs::create_dir(folder.join("data")).unwrap();
-    let files = fs::read_dir(root().join("data")).unwrap();
-    let mut files: Vec<_> = files.map(|entry| entry.unwrap().file_name()).collect();
-    files.sort();
-    for name in files {
-        let file = Path::new("data").join(name);
-        fs::copy(root().join(&file), folder.join(&file)).unwrap();
+    for directory in ["data", "docs/retarget"] {
+        fs::create_dir_all(folder.join(directory)).unwrap();
+        let files = fs::read_dir(root().join(directory)).unwrap();
+        let mut files: Vec<_> = files.map(|entry| entry.unwrap().file_name()).collect();
+        files.sort();
+        // The commands make the pictures.
+        for name in files
+            .iter()
+            .filter(|name| !name.to_string_lossy().ends_with(".png"))
+        {
+            let file = Path::new(directory).join(name);
+            fs::copy(root().join(&file), folder.join(&file)).unwrap();
+        }
     }
 }
 
-/// Runs the commands of a page, of which there are at least so many.
-fn check(page: &str, least: usize) {
+/// Runs the commands of a page, of which there are at least so many; gives the folder with what they made.
+fn check(page: &str, least: usize) -> TempDir {
     let page = root().join(page);
     let text = fs::read_to_string(&page).unwrap();
     let folder = tempfile::tempdir().unwrap();
@@ -73,9 +82,19 @@ fn check(page: &str, least: usize) {
     let (found, expected) = (without_durations(&written), without_durations(&text));
     if found != expected && std::env::var_os("UPDATE_EXPECTED").is_some() {
         fs::write(&page, written).unwrap();
-        return;
+        return folder;
     }
     assert_eq!(found, expected, "UPDATE_EXPECTED=1 writes what is printed");
+    folder
+}
+
+/// The size and the colours of a picture.
+fn pixels(path: &Path) -> (png::OutputInfo, Vec<u8>) {
+    let file = BufReader::new(fs::File::open(path).unwrap());
+    let mut reader = png::Decoder::new(file).read_info().unwrap();
+    let mut bytes = vec![0; reader.output_buffer_size().unwrap()];
+    let info = reader.next_frame(&mut bytes).unwrap();
+    (info, bytes)
 }
 
 #[test]
@@ -86,4 +105,30 @@ fn the_commands_of_the_tutorial_print_what_it_says() {
 #[test]
 fn the_first_steps_of_each_kind_of_user_print_what_the_page_says() {
     check("docs/start.md", 10);
+}
+
+/// The pictures of motions on other skeletons are those that the commands under them make.
+#[test]
+fn the_pictures_of_retargeting_are_those_of_the_commands() {
+    let folder = check("docs/retarget.md", 6);
+    for name in ["vrm", "mixamo", "smpl"] {
+        let picture = format!("docs/retarget/{name}.png");
+        let [made, kept] = [folder.path(), root()].map(|folder| folder.join(&picture));
+        if std::env::var_os("UPDATE_EXPECTED").is_some() {
+            fs::copy(&made, &kept).unwrap();
+        }
+        let ((info, made), (expected, kept)) = (pixels(&made), pixels(&kept));
+        assert_eq!(info, expected, "{picture}");
+        // Edges may be a pixel further on other processors.
+        let others = made
+            .iter()
+            .zip(&kept)
+            .filter(|(one, other)| one.abs_diff(**other) > 8);
+        let others = others.count();
+        assert!(
+            others * 200 < kept.len(),
+            "{picture}: {others} of {} differ",
+            kept.len()
+        );
+    }
 }

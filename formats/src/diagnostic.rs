@@ -166,7 +166,7 @@ codes! {
     Changed = "E003" elsewhere, "the file changed while it was read", "Its length or its modification time changed during reading. Try again when the other program has finished writing.";
     OtherFormat = "E004", "another format", "The first bytes or the name belong to a kind of file that is not read, or not in the requested format. The message names the kind and says how to read or convert the file.";
     Encoding = "E005", "not plain text", "A `.dat` file is ASCII or UTF-8 text; UTF-16, NUL bytes and invalid UTF-8 are refused.";
-    Character = "E006", "a character that does not belong", "Lines of numbers contain only printable ASCII, blanks and tabs. No-break spaces, form feeds and single carriage returns are refused because editors hide them.";
+    Character = "E006", "a character that does not belong", "Lines of numbers contain only printable ASCII, blanks and tabs. No-break spaces and form feeds are refused because editors hide them. In all formats of lines, CSV and OBJ among them, a single carriage return is refused too: it ended lines on old Macintoshes, and most programs read the whole file as one line; save the file with LF or CR LF.";
     LineTooLong = "E007" elsewhere, "a line is too long", "Lines of keyframe data are never this long; the file is probably of another kind.";
     FileTooLong = "E008" elsewhere, "the file is too long", "The limit protects against endless inputs; raise it by `--max-size` if the file is correct.";
     Empty = "E010", "an empty file", "The file has no bytes, or no line: the program that wrote it may have been stopped, or its disk was full.";

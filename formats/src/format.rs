@@ -412,6 +412,22 @@ pub trait Document: fmt::Debug + Send + Sync {
         let message = "only animations of glTF are replaced";
         Err(io::Error::new(io::ErrorKind::Unsupported, message).into())
     }
+
+    /// Writes the file with the keys of these clips instead of those of the joints in the animations that the clips were
+    /// read from, by their indices. Everything else stays: the names of animations, morph weights, and other animations.
+    /// Returns warnings.
+    ///
+    /// # Errors
+    /// As [`Document::write_instead`].
+    fn write_joints(
+        &self,
+        clips: &[&Motion],
+        options: &MotionOptions,
+        path: &Path,
+        out: &mut dyn Write,
+    ) -> Result<Vec<Diagnostic>, WriteError> {
+        self.write_instead(clips, options, path, out)
+    }
 }
 
 /// Writes sampled clips; returns warnings about data that is changed.

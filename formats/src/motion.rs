@@ -295,6 +295,9 @@ pub struct Body {
     pub pelvis: Vec3,
     /// The shape, as the file specifies it.
     pub shape: Shape,
+    /// The direction that points up in the clip's axes; `None` if it is not known, because most files of bodies do not
+    /// state it. At rest, a body stands along y and faces z in the axes of its model, whichever direction this is.
+    pub up: Option<DVec3>,
 }
 
 /// The shape of an SMPL body.

@@ -14,12 +14,13 @@ use glam::{DMat3, DQuat, DVec3};
 use tumble::reference::angle_between;
 use tumble::{TrackError, names};
 
-pub use roles::{Role, Roles, recognise};
+pub use roles::{Role, Roles, missing_text, recognise, standing_axis};
 
 use crate::diagnostic::Diagnostic;
-use crate::format::{Format, Loaded, ReadOptions};
+use crate::format::{Format, Loaded, ReadOptions, Space};
 use crate::gltf;
 use crate::learning::rotation_between;
+use crate::motion::adjust::UpAxis;
 use crate::motion::keyed::{KeyedError, keyed_tracks};
 use crate::motion::world::{HierarchyError, parents_first};
 use crate::motion::{Channels, Motion};
@@ -91,6 +92,12 @@ pub struct RetargetReport {
     pub axes: DQuat,
     /// Whether `axes` was neither given nor found, and is the identity.
     pub are_axes_assumed: bool,
+    /// The axis along which the source, an SMPL body, stands on average, if the clip does not state what points up and this
+    /// is not y. The motion was then rotated, so that y points up.
+    pub stood_along: Option<DVec3>,
+    /// The axes along which the source stands in its rest pose and, on average, in the motion, if they differ. Another pose is
+    /// then needed as the rest pose, such as one of the motion ([`RetargetOptions::rest_frame`]).
+    pub rests_along: Option<[DVec3; 2]>,
     /// How far a joint of the source other than the hips moves away from where it rests, in its unit, which is lost.
     pub dropped_translation: f64,
     /// The largest angle in radians between the differences from rest of a joint and of its partner, caused by
@@ -117,7 +124,7 @@ pub enum RetargetError {
     /// A skeleton's joints have no names that are known.
     #[error(
         "the joints of the {which} are not those of a known human skeleton: {}; pair them by `bones`",
-        if missing.is_empty() { "two kinds fit as well".to_owned() } else { format!("it has no {}", missing.join(", ")) }
+        missing_text(missing)
     )]
     NotRecognised {
         /// `source` or `target`.
@@ -125,6 +132,9 @@ pub enum RetargetError {
         /// The roles without a joint.
         missing: Vec<&'static str>,
     },
+    /// The positions of the source's joints are not known.
+    #[error("{0}")]
+    NoPositions(String),
     /// A joint of `bones` does not exist, or is there twice.
     #[error("bones: the {which} has no joint `{name}`, or it is paired twice")]
     Bone {
@@ -230,6 +240,34 @@ impl<'a> Rig<'a> {
     fn named(&self, name: &str) -> Option<usize> {
         self.names.iter().position(|joint| joint == name)
     }
+
+    /// Places the rest pose on the ground, at height 0, with its root above the origin. The rest pose of an SMPL body is that
+    /// of its model, which is placed at no certain height; its motion is relative to the ground.
+    fn stand_on_ground(&mut self) {
+        let root = { self.order.iter() }.find(|&&joint| self.parents[joint].is_none());
+        let lowest = self.rest.positions.iter().map(|point| point.y);
+        let lowest = lowest.fold(f64::INFINITY, f64::min);
+        if let Some(&root) = root {
+            let DVec3 { x, z, .. } = self.rest.positions[root];
+            for position in &mut self.rest.positions {
+                *position -= DVec3::new(x, lowest, z);
+            }
+        }
+    }
+}
+
+/// Some samples of a motion, up to 64.
+fn some_of(samples: usize) -> impl Iterator<Item = usize> {
+    (0..samples).step_by(samples.div_ceil(64).max(1))
+}
+
+/// The axis that a direction is nearest to.
+fn nearest_axis(direction: DVec3) -> Option<DVec3> {
+    let largest = direction.abs().max_element();
+    let axis = DVec3::AXES
+        .into_iter()
+        .find(|axis| direction.dot(*axis).abs() == largest)?;
+    (largest > 0.0).then(|| axis * direction.dot(axis).signum())
 }
 
 /// Reads the target skeleton. A glTF file needs no animations; its [`document`](Loaded::document) can be written with
@@ -264,9 +302,12 @@ pub fn retarget(
 ) -> Result<(Motion, RetargetReport), RetargetError> {
     let mut from = Rig::new(source, "source")?;
     let to = Rig::new(target, "target")?;
+    if let Some(reason) = source.no_world.as_ref().filter(|_| source.lacks_offsets()) {
+        return Err(RetargetError::NoPositions(reason.clone()));
+    }
     let samples = keyed_tracks(source)?;
     let joints = from.names.len();
-    let local = |sample: usize, joint: usize| {
+    let stored = |sample: usize, joint: usize| {
         let index = sample * joints + joint;
         let moved = samples.translations.get(index);
         let position = moved.map_or_else(
@@ -275,12 +316,39 @@ pub fn retarget(
         );
         (samples.rotations[index].as_dquat().normalize(), position)
     };
+    // A body rests in the axes of its model, with y up, and moves in those of its world.
+    let mut stood_along = None;
+    let mut to_model = DQuat::IDENTITY;
+    if let Some(body) = &source.body {
+        let found = || {
+            let roles = recognise(&from.names, &from.parents).ok()?;
+            let poses = some_of(samples.times.len());
+            let poses = poses.map(|sample| from.world(|joint| stored(sample, joint)).positions);
+            stood_along = standing_axis(&roles, poses).filter(|axis| *axis != DVec3::Y);
+            stood_along
+        };
+        let up = body.up.and_then(nearest_axis).or_else(found);
+        let space = Space {
+            up: up.unwrap_or(DVec3::Y),
+            metres: 1.0,
+        };
+        to_model = UpAxis::Y.rotation_from(Some(space));
+        from.stand_on_ground();
+    }
+    let local = |sample: usize, joint: usize| {
+        let (rotation, position) = stored(sample, joint);
+        match from.parents[joint] {
+            None => (to_model * rotation, to_model * position),
+            Some(_) => (rotation, position),
+        }
+    };
     if let Some(frame) = options.rest_frame {
         let count = samples.times.len();
         if frame >= count {
             return Err(RetargetError::RestFrame { frame, count });
         }
-        from.rest = from.world(|joint| local(frame, joint));
+        let rest = from.world(|joint| local(frame, joint));
+        from.rest = rest;
     }
     let roles = [&from, &to].map(|rig| recognise(&rig.names, &rig.parents));
     let pairs = match &options.bones[..] {
@@ -291,6 +359,17 @@ pub fn retarget(
     let found = || {
         Some(axes_of(&to, to_roles.as_ref()?)? * axes_of(&from, from_roles.as_ref()?)?.inverse())
     };
+    let rests_along = || {
+        let roles = from_roles.as_ref()?;
+        let poses = some_of(samples.times.len());
+        let poses = poses.map(|sample| from.world(|joint| local(sample, joint)).positions);
+        let [at_rest, moving] = [
+            standing_axis(roles, [&from.rest.positions])?,
+            standing_axis(roles, poses)?,
+        ];
+        (at_rest != moving).then_some([at_rest, moving])
+    };
+    let rests_along = rests_along();
     let known_axes = options.axes.map(DQuat::normalize).or_else(found);
     let axes = known_axes.unwrap_or(DQuat::IDENTITY);
     let segments = pairs.segments(&to, to_roles.as_ref());
@@ -378,6 +457,10 @@ pub fn retarget(
         motion.set_positions(joint, &samples.times, &hips)?;
     }
     let mut motion = motion.with_scalars_of(source, 1.0)?;
+    if let Some(body) = &mut motion.body {
+        // The rest pose that it was carried to is that of the model.
+        body.up = Some(DVec3::Y);
+    }
     if !source.channels.is_empty() {
         let channel = |partner: &Option<usize>| {
             let partner = partner.map_or(Channels::default(), |partner| source.channel(partner));
@@ -422,6 +505,8 @@ pub fn retarget(
         scale,
         axes,
         are_axes_assumed: known_axes.is_none(),
+        stood_along,
+        rests_along,
         dropped_translation,
         largest_difference,
         below_ground: ends.below_ground,
@@ -536,15 +621,8 @@ impl Ends {
 /// coordinates. `None` where they are not told apart.
 fn axes_of(rig: &Rig<'_>, roles: &Roles) -> Option<DQuat> {
     let at = |role| roles.joint(role).map(|joint| rig.rest.positions[joint]);
-    let along = |vector: DVec3| {
-        let largest = vector.abs().max_element();
-        let axis = DVec3::AXES
-            .into_iter()
-            .find(|axis| vector.dot(*axis).abs() == largest)?;
-        (largest > 0.0).then(|| axis * vector.dot(axis).signum())
-    };
-    let up = along(at(Role::Head)? - at(Role::Hips)?)?;
-    let left = along(at(Role::LeftUpperLeg)? - at(Role::RightUpperLeg)?)?;
+    let up = nearest_axis(at(Role::Head)? - at(Role::Hips)?)?;
+    let left = nearest_axis(at(Role::LeftUpperLeg)? - at(Role::RightUpperLeg)?)?;
     (up.dot(left) == 0.0).then(|| DQuat::from_mat3(&DMat3::from_cols(left, up, left.cross(up))))
 }
 

@@ -202,6 +202,22 @@ fn left_and_right_change_places() {
     ];
     assert_eq!(pairs, expected);
     assert_eq!(without_partner(&names, &pairs), [18, 19]);
+    // Serial numbers may differ where no other name is the same without them.
+    let names = [
+        "b_LeftHand_011",
+        "b_RightHand_08",
+        "b_LeftLeg01_015",
+        "b_RightLeg01_019",
+        "b_LeftLeg02_016",
+        "left_toe_1",
+        "left_toe_2",
+        "right_toe_3",
+        "Arm.L.001",
+        "Arm.R.002",
+    ];
+    let pairs = mirror_pairs(&names);
+    assert_eq!(pairs, [1, 0, 3, 2, 4, 5, 6, 7, 9, 8]);
+    assert_eq!(without_partner(&names, &pairs), [4, 5, 6, 7]);
     let (point, rotation) = (
         DVec3::new(1.0, 2.0, 3.0),
         DQuat::from_xyzw(0.1, 0.2, 0.3, 0.9).normalize(),

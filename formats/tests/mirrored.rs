@@ -146,6 +146,14 @@ fn sides_must_fit_and_others_are_reported() {
     clip.skeleton[2].parent = Some(0);
     let refused = mirrored(&clip, ACROSS_X).unwrap_err();
     assert!(matches!(refused, MirrorError::Parents { .. }), "{refused}");
+    let said = "`left_foot` and `right_foot` are a pair by their names, but their parents `hips` and `right_hip` are none; ";
+    assert!(refused.to_string().starts_with(said), "{refused}");
+    // A joint on one side alone.
+    let mut clip = body(|_| DQuat::IDENTITY);
+    clip.set.set_name(2, "tail").unwrap();
+    let refused = mirrored(&clip, ACROSS_X).unwrap_err().to_string();
+    let said = "`tail` has no partner, but its parent `left_hip` is mirrored to `right_hip`; ";
+    assert!(refused.starts_with(said), "{refused}");
 }
 
 /// Two legs; the axes of the right one point the other way, and a joint has a reference.

@@ -355,7 +355,7 @@ fn skeletons_are_recognised_by_names_and_places() {
     );
     let error = retarget(&mixamo(bent, 2), &other, &RetargetOptions::default()).unwrap_err();
     assert!(error.to_string().starts_with(
-        "the joints of the target are not those of a known human skeleton: it has no hips, "
+        "the joints of the target are not those of a known human skeleton: no joint has a known name for hips, "
     ));
     let error = retarget(&Motion::default(), &other, &RetargetOptions::default()).unwrap_err();
     assert!(matches!(

@@ -5,6 +5,7 @@ use tumble::{Channel, FrameRate};
 use tumble_formats::csv::read::read_csv;
 use tumble_formats::format::TimeUnit;
 use tumble_formats::keys::Duplicates;
+use tumble_formats::surface::obj::read_obj;
 use tumble_formats::{Code, Diagnostic, Loaded, Location, ReadOptions};
 
 fn read(text: &str, options: &ReadOptions) -> Result<Loaded, Diagnostic> {
@@ -177,6 +178,21 @@ fn names_that_do_not_fit_are_refused() {
         loaded.clips[0].set.track(0).keys[0].to_array(),
         [1.0, 0.0, 0.0, 0.0]
     );
+}
+
+/// One rule for all formats of lines: a carriage return alone is refused, but within the quotes of a cell and at the end.
+#[test]
+fn a_carriage_return_alone_ends_no_line() {
+    let code = |refusal: Option<Diagnostic>| refusal.map(|refusal| refusal.code);
+    let obj = |text: &str| code(read_obj("a.obj", text.as_bytes()).err());
+    let points = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+    assert_eq!(obj(points), None);
+    assert_eq!(obj(&points.replace('\n', "\r\n")), None);
+    assert_eq!(obj(&points.replace('\n', "\r")), Some(Code::Character));
+    let csv = |text: &str| code(read(text, &ReadOptions::default()).err());
+    assert_eq!(csv("time,x,y,z,w\n0,0,0,0,1\n1,0,0,0,1\r"), None);
+    assert_eq!(csv("time,x,y,z,w,note\n0,0,0,0,1,\"a\rb\"\n"), None);
+    assert_eq!(csv("time,x,y,z,w\r0,0,0,0,1\r"), Some(Code::Character));
 }
 
 proptest! {

@@ -162,6 +162,8 @@ pub(crate) fn state<'py>(py: Python<'py>, clip: &Clip) -> PyResult<Bound<'py, Py
     state.set_item("pelvis", body.map(|body| body.pelvis.to_array()))?;
     state.set_item("betas", body.map(|body| body.shape.betas.clone()))?;
     state.set_item("gender", body.map(|body| body.shape.gender.clone()))?;
+    let up = body.and_then(|body| body.up);
+    state.set_item("up", up.map(|up| up.to_array()))?;
     if let Some(source) = &clip.source {
         state.set_item("path", &source.path)?;
         state.set_item("clips", source.clips)?;
@@ -346,6 +348,7 @@ fn motion_of(state: &Bound<'_, PyDict>) -> PyResult<Motion> {
     let pelvis: Option<[f32; 3]> = entry(state, "pelvis")?.extract()?;
     let betas: Option<Vec<f64>> = entry(state, "betas")?.extract()?;
     let gender: Option<String> = entry(state, "gender")?.extract()?;
+    let up: Option<[f64; 3]> = entry(state, "up")?.extract()?;
     let shape = Shape {
         betas: betas.unwrap_or_default(),
         gender: gender.unwrap_or_default(),
@@ -366,6 +369,7 @@ fn motion_of(state: &Bound<'_, PyDict>) -> PyResult<Motion> {
         body: pelvis.map(|pelvis| Body {
             pelvis: Vec3::from_array(pelvis),
             shape,
+            up: up.map(DVec3::from_array),
         }),
         // Not pickled: it is only used while a file is read, to check the orders.
         robot: None,

@@ -159,6 +159,11 @@ impl ReadingArguments {
         self.keyframes || self.names_method.get().is_some()
     }
 
+    /// Whether the command line converts inputs to an up axis.
+    pub(crate) fn sets_up_axis(&self) -> bool {
+        self.up_axis.is_some()
+    }
+
     /// Whether the command line chooses one animation.
     pub(crate) fn chooses_animation(&self) -> bool {
         self.animation.is_some()

@@ -19,6 +19,11 @@ pub(crate) struct VerticalArguments {
 }
 
 impl VerticalArguments {
+    /// Whether the command line names the axis.
+    pub(crate) fn is_set(&self) -> bool {
+        self.vertical.is_some()
+    }
+
     /// The axis that points up in a clip. `is_robot`: the clip is of a robot that the command line names.
     pub(crate) fn ground(&self, clip: &Motion, is_robot: bool) -> Ground {
         self.vertical

@@ -6,7 +6,7 @@ use clap::Args;
 use tumble::{Device, Engine, EulerSequence, SampleTimes};
 use tumble_formats::dialect::write::WrittenDialect;
 use tumble_formats::format::{FormatOption, MotionOptions};
-use tumble_formats::learning::{Mirror, MirrorError, mirrored};
+use tumble_formats::learning::{Mirror, MirrorError, mirrored, without_partner};
 use tumble_formats::motion::Motion;
 use tumble_formats::printable::printable;
 use tumble_formats::quaternion::ComponentOrder;
@@ -25,9 +25,9 @@ use crate::arguments::time::{check_range, finite_seconds};
 use crate::batch::pipeline::{ClipWork, EvaluatedResult};
 use crate::batch::preview::PlannedWork;
 use crate::batch::target::ResultTarget;
-use crate::commands::features::mirror_axis;
+use crate::commands::features::{mirror_axis, warn_of_lost_partners};
 use crate::messages::exit::{ALL_INPUTS, Failure};
-use crate::messages::words;
+use crate::messages::{names, words};
 
 /// Convert motion files to another format, without resampling
 #[derive(Debug, Args)]
@@ -179,6 +179,13 @@ impl Arguments {
             );
             work.warn(Diagnostic::new(name, Code::NotSymmetric, message));
         }
+        let several = work.clips().len() > 1;
+        let name = &*match several {
+            true => format!("{name} {}", names::clip(clip)),
+            false => name.to_owned(),
+        };
+        let in_place: Vec<usize> = (0..report.alone.len()).collect();
+        warn_of_lost_partners(name, &report.alone, &in_place);
         let pairs = words::count(report.pairs.len(), "pair");
         let alone = match report.alone.len() {
             0 => "no joint is".to_owned(),
@@ -208,21 +215,17 @@ impl Arguments {
             box_length: loaded.box_length,
             ..target.motion_options()
         };
-        // A channel of one side may be none of the other, so all animations of a glTF file are replaced.
+        // A channel of one side may be none of the other, so all channels of joints in a glTF file are replaced.
         let replaces = self.mirror.is_some() && target.format().supports(Feature::SeveralClips);
         let written = match document {
             Some(document) if is_copy => {
                 target.write_motion(|out| document.write(&[], &options, target.path(), out))?
             }
             Some(document) if replaces => {
-                if parts.iter().any(|part| part.set.scalar_count() > 0) {
-                    let message = "the weights of morph targets are left out".to_owned();
-                    work.warn(Diagnostic::new(name, Code::NoRoom, message));
-                }
+                note_weights(name, &clips);
                 let all: Vec<&Motion> = parts.iter().map(AsRef::as_ref).collect();
-                target.write_motion(|out| {
-                    document.write_instead(&all, &options, target.path(), out)
-                })?
+                target
+                    .write_motion(|out| document.write_joints(&all, &options, target.path(), out))?
             }
             document => write_keys(name, &parts, document, &options, target)?,
         };
@@ -280,6 +283,22 @@ impl Arguments {
         let several = target.format().supports(Feature::SeveralClips);
         let chooses = self.inputs.reading.chooses_animation() && several;
         makes_new(&self.inputs).or(chooses.then_some("one animation makes"))
+    }
+}
+
+/// Says that the weights of morph targets stay as they are, if some are those of one side.
+fn note_weights(name: &str, clips: &[&Motion]) {
+    for clip in clips {
+        let weights: Vec<&str> = clip.scalar_keys().map(|keys| keys.name).collect();
+        let in_place: Vec<usize> = (0..weights.len()).collect();
+        let of_sides = without_partner(&weights, &in_place);
+        if let Some(&first) = of_sides.first() {
+            words::warning(&format!(
+                "{name}: the weights of morph targets are not mirrored: {} with the name of a side (the first: {})",
+                words::count(of_sides.len(), "target"),
+                printable(weights[first])
+            ));
+        }
     }
 }
 

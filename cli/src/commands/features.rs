@@ -14,7 +14,8 @@ use tumble_formats::learning::{
     without_partner, write_features,
 };
 use tumble_formats::motion::{Joint, Motion};
-use tumble_formats::retarget::{Role, recognise};
+use tumble_formats::printable::printable;
+use tumble_formats::retarget::{Role, Roles, missing_text, recognise, standing_axis};
 use tumble_formats::robot::{
     BodiesError, BodiesRequest, LimitRule, Robot, VelocityPoint, VelocitySource, bodies,
 };
@@ -185,8 +186,8 @@ fn warn_of_other_unit(name: &str, set: &str, poses: &WorldFrames) {
 }
 
 /// Warns of joints that name a side, but are mirrored in place.
-fn warn_of_lost_partners(name: &str, names: &[String]) {
-    let alone = without_partner(names, &mirror_pairs(names));
+pub(crate) fn warn_of_lost_partners(name: &str, names: &[String], pairs: &[usize]) {
+    let alone = without_partner(names, pairs);
     if let Some(&first) = alone.first() {
         words::warning(&format!(
             "{name}: mirrored in place: {} with the name of a side and no partner on the other (the first: {})",
@@ -196,19 +197,61 @@ fn warn_of_lost_partners(name: &str, names: &[String]) {
     }
 }
 
-/// Refuses skeletons whose joints have other axes at rest than those of SMPL, which are the axes of the world.
-fn check_rest(name: &str, clip: &Motion) -> Result<(), Failure> {
-    let is_rotated = |joint: &&Joint| joint.rest.rotation.w.abs() < 1.0 - 1e-6;
-    match clip.skeleton.iter().find(is_rotated) {
-        None => Ok(()),
-        Some(_) => Err(Failure::new(
-            ALL_INPUTS,
-            format!(
-                "{name}: Kimodo's rotations are those of SMPL, whose joints have the axes of the world at rest; `tumble \
-                 retarget --onto` carries the motion to such a skeleton"
-            ),
-        )),
+/// Refuses skeletons that rest otherwise than SMPL: in a T-pose with y up that faces z, where all joints have the axes of
+/// the world.
+fn check_rest(name: &str, clip: &Motion, roles: &Roles) -> Result<(), Failure> {
+    let refused = |difference: String| {
+        let message = format!(
+            "{name}: Kimodo's rotations are those of SMPL, which rests in a T-pose with y up that faces z, where all joints \
+             have the axes of the world; {difference}; `tumble retarget --onto` carries the motion to such a skeleton"
+        );
+        Err(Failure::new(ALL_INPUTS, message))
+    };
+    let is_rotated = |joint: &Joint| joint.rest.rotation.w.abs() < 1.0 - 1e-6;
+    if let Some(joint) = clip.skeleton.iter().position(is_rotated) {
+        let joint = clip.set.track_name(joint);
+        return refused(format!("here `{}` is rotated at rest", printable(&joint)));
     }
+    for (role, end, direction) in [
+        (Role::Hips, Role::Head, DVec3::Y),
+        (Role::LeftUpperArm, Role::LeftHand, DVec3::X),
+        (Role::RightUpperArm, Role::RightHand, DVec3::NEG_X),
+        (Role::LeftUpperLeg, Role::LeftFoot, DVec3::NEG_Y),
+        (Role::RightUpperLeg, Role::RightFoot, DVec3::NEG_Y),
+    ] {
+        let (Some(first), Some(mut joint)) = (roles.joint(role), roles.joint(end)) else {
+            continue;
+        };
+        let mut along = DVec3::ZERO;
+        while joint != first
+            && let Some(parent) = clip.skeleton[joint].parent
+        {
+            along += clip.rest_position(joint);
+            joint = parent;
+        }
+        let apart = along.angle_between(direction).to_degrees();
+        if apart > T_POSE {
+            let (first, end) = (clip.set.track_name(first), roles.joint(end));
+            let end = clip.set.track_name(end.unwrap_or_default());
+            return refused(format!(
+                "here the direction from `{}` to `{}` is {apart:.0}° away from that at rest",
+                printable(&first),
+                printable(&end)
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// How far the limbs of a T-pose are from the axes at most, in degrees; legs are often apart.
+const T_POSE: f64 = 30.0;
+
+/// What a set of features measures from the ground.
+fn depends_on_ground(set: FeatureSet) -> bool {
+    matches!(
+        set,
+        FeatureSet::Heading | FeatureSet::Contacts | FeatureSet::Humanml3d | FeatureSet::Kimodo
+    )
 }
 
 impl Arguments {
@@ -229,10 +272,14 @@ impl Arguments {
             .ok_or_else(|| Failure::usage(format!("{name}: its keys have no rate; give --fps")))?;
         let robot = self.inputs.reading.robot()?;
         let ground = self.vertical.ground(&clip, robot.is_some());
-        let poses = match robot {
-            Some(robot) => self.of_robot(name, &clip, &robot, rate, engine)?,
+        let poses = match &robot {
+            Some(robot) => self.of_robot(name, &clip, robot, rate, engine)?,
             None => self.of_skeleton(name, &clip, rate, engine)?,
         };
+        let roles = roles_of(&clip, &poses.names);
+        if let (None, Ok(roles)) = (&robot, &roles) {
+            self.check_up(name, &poses, roles, ground)?;
+        }
         let request = FeatureRequest {
             sets: self.sets.clone(),
             ground,
@@ -245,11 +292,14 @@ impl Arguments {
                 Ground::Y => 0,
                 Ground::Z => 1,
             }),
-            humanml3d_joints: joints_of_smpl(&clip, &poses.names),
+            humanml3d_joints: roles
+                .as_ref()
+                .map_err(String::clone)
+                .and_then(joints_of_smpl),
             rate,
         };
-        if self.sets.contains(&FeatureSet::Kimodo) {
-            check_rest(name, &clip)?;
+        if let (true, Ok(roles)) = (self.sets.contains(&FeatureSet::Kimodo), &roles) {
+            check_rest(name, &clip, roles)?;
         }
         if self.sets.contains(&FeatureSet::Humanml3d) {
             warn_of_other_rate(name, rate);
@@ -263,7 +313,7 @@ impl Arguments {
             }
         }
         if self.sets.contains(&FeatureSet::Mirror) {
-            warn_of_lost_partners(name, &poses.names);
+            warn_of_lost_partners(name, &poses.names, &mirror_pairs(&poses.names));
         }
         let failed =
             |error: &dyn std::fmt::Display| Failure::new(ALL_INPUTS, format!("{name}: {error}"));
@@ -284,6 +334,42 @@ impl Arguments {
             report.arrays.join(", ")
         );
         Ok((work.result(written, &done, None), report))
+    }
+
+    /// Refuses a body that stands along another axis than the one that points up, for sets that depend on it. Where the command
+    /// line states the axis, this is a warning: a body may lie or crawl.
+    fn check_up(
+        &self,
+        name: &str,
+        poses: &WorldFrames,
+        roles: &Roles,
+        ground: Ground,
+    ) -> Result<(), Failure> {
+        let sets = self.sets.iter().copied();
+        let Some(set) = { sets }.find(|&set| depends_on_ground(set)) else {
+            return Ok(());
+        };
+        let frames = poses.positions.chunks(poses.names.len().max(1));
+        let Some(axis) = standing_axis(roles, frames).filter(|axis| *axis != ground.up()) else {
+            return Ok(());
+        };
+        let (up, axis) = (ground.name(), axis_name(axis));
+        let message = format!("{name}: the body stands along {axis}, from its feet to its head");
+        let option = match (self.vertical.is_set(), self.inputs.reading.sets_up_axis()) {
+            (true, _) => "--vertical",
+            (false, true) => "--up-axis",
+            (false, false) => {
+                let message = format!(
+                    "{message}, and {set} is computed with {up} up; --up-axis {up} converts a body that stands along z, \
+                     --vertical {up} accepts the axes as they are"
+                );
+                return Err(Failure::new(ALL_INPUTS, message));
+            }
+        };
+        words::warning(&format!(
+            "{message}, and {option} states that {up} points up"
+        ));
+        Ok(())
     }
 
     fn methods(&self) -> ChannelMethods {
@@ -399,8 +485,32 @@ impl Arguments {
     }
 }
 
-/// The joints of SMPL in its order, by the parts of the body that the names of a skeleton mean.
-fn joints_of_smpl(clip: &Motion, names: &[String]) -> Option<[usize; 22]> {
+/// `-z` for the negative z axis.
+pub(crate) fn axis_name(axis: DVec3) -> String {
+    let name = ["x", "y", "z"][axis.abs().max_position()];
+    match axis.element_sum() < 0.0 {
+        true => format!("-{name}"),
+        false => name.to_owned(),
+    }
+}
+
+/// The parts of the body that the names of a skeleton's joints mean; or why they are not known, with the remedy.
+fn roles_of(clip: &Motion, names: &[String]) -> Result<Roles, String> {
+    let parents: Vec<Option<usize>> = clip.skeleton.iter().map(|joint| joint.parent).collect();
+    recognise(names, &parents).map_err(|missing| {
+        format!(
+            "the joints are not those of a known human skeleton: {}; {REMEDY}",
+            missing_text(&missing)
+        )
+    })
+}
+
+/// For skeletons without the joints of SMPL.
+const REMEDY: &str = "`tumble retarget --onto FILE --bones FILE` carries the motion to a skeleton that has all, such as one of SMPL";
+
+/// The joints of SMPL in its order, by the parts of the body that the joints of a skeleton are; or why there are not all of
+/// them.
+fn joints_of_smpl(roles: &Roles) -> Result<[usize; 22], String> {
     const ROLES: [Role; 22] = [
         Role::Hips,
         Role::LeftUpperLeg,
@@ -425,11 +535,15 @@ fn joints_of_smpl(clip: &Motion, names: &[String]) -> Option<[usize; 22]> {
         Role::LeftHand,
         Role::RightHand,
     ];
-    let parents: Vec<Option<usize>> = clip.skeleton.iter().map(|joint| joint.parent).collect();
-    let roles = recognise(names, &parents).ok()?;
     let joints = ROLES.map(|role| roles.joint(role));
-    joints
-        .iter()
-        .all(Option::is_some)
-        .then(|| joints.map(Option::unwrap_or_default))
+    let missing = ROLES.iter().filter(|&&role| roles.joint(role).is_none());
+    let missing: Vec<&str> = missing.map(|role| role.name()).collect();
+    match missing[..] {
+        [] => Ok(joints.map(Option::unwrap_or_default)),
+        _ => Err(format!(
+            "the skeleton is that of {}, and {}; {REMEDY}",
+            roles.kind,
+            missing_text(&missing)
+        )),
+    }
 }

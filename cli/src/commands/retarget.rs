@@ -23,6 +23,7 @@ use crate::arguments::results::{ResultArguments, check_sequence, check_stores_ke
 use crate::batch::pipeline::{ClipWork, EvaluatedResult};
 use crate::batch::preview::PlannedWork;
 use crate::batch::target::{Destination, ResultTarget, WrittenFile};
+use crate::commands::features::axis_name;
 use crate::messages::exit::{ALL_INPUTS, Failure};
 use crate::messages::words;
 
@@ -281,6 +282,20 @@ impl Arguments {
                     printable(joint)
                 );
                 work.warn(Diagnostic::new(name, Code::RotationsDropped, message));
+            }
+            if let Some(axis) = report.stood_along {
+                let axis = axis_name(axis);
+                words::note(&format!(
+                    "{name}: the body stands along {axis} on average, so it is rotated until y points up (--up-axis states the \
+                     axis of the input)"
+                ));
+            }
+            if let Some([at_rest, moving]) = report.rests_along {
+                let [at_rest, moving] = [at_rest, moving].map(axis_name);
+                words::warning(&format!(
+                    "{name}: the body stands along {moving} in the motion and along {at_rest} in the rest pose of its \
+                     skeleton, so the result does not stand upright; --rest-frame takes a pose of the motion as the rest pose"
+                ));
             }
             if report.are_axes_assumed {
                 let message = "the axes of both skeletons are taken to be the same, because it is not known which joints \

@@ -17,6 +17,7 @@ use crate::table::clips::clips;
 use crate::table::columns::{Column, ColumnNeed, ColumnNumbers, ColumnValues, Table};
 use crate::table::plan::{TablePlan, TimeSource};
 use crate::text::cell::cell_text;
+use crate::text::lines::refuse_lone_returns;
 use crate::text::{last_number, number};
 use crate::warnings::Warnings;
 
@@ -186,6 +187,7 @@ fn check_encoding(name: &str, bytes: &[u8], warnings: &mut Warnings) -> Result<u
     if bytes.contains(&0) {
         return refuse("there is a NUL byte; this is not a text file");
     }
+    refuse_lone_returns(name, bytes, Some(b'"'))?;
     if bytes.starts_with(b"\xef\xbb\xbf") {
         warnings.warn(Code::ByteOrderMark, || {
             let location = Location::Text { line: 1, column: 1 };

@@ -3,15 +3,17 @@
 use std::collections::{BTreeSet, HashMap};
 
 use glam::DVec3;
-use tumble::Channel;
+use serde_json::value::RawValue;
+use tumble::Channel as VectorChannel;
 
 use crate::diagnostic::{Code, Diagnostic};
 use crate::format::WriteError;
 use crate::gltf::edits::Edits;
+use crate::gltf::json::JsonMembers;
 use crate::gltf::key_bytes::KeyBytes;
 use crate::gltf::nodes::Nodes;
 use crate::gltf::reader::GltfReader;
-use crate::gltf::schema::{Skin, TargetPath};
+use crate::gltf::schema::{Animation, Channel, Skin, TargetPath};
 use crate::gltf::write_new::{
     NewAnimation, NewChannel, NewSampler, NewTarget, UniqueNames, f32_times,
 };
@@ -73,24 +75,149 @@ pub(super) fn replace_animations(
     edits: &mut Edits<'_>,
 ) -> Result<Vec<u8>, WriteError> {
     let json = reader.json;
-    let named: HashMap<&str, usize> = (0..nodes.count())
-        .map(|node| (nodes.name(node), node))
-        .collect();
-    let (mut bytes, mut names) = (KeyBytes::new(edits), UniqueNames::default());
+    let mut writer = ChannelWriter::new(nodes, output, edits);
+    let mut names = UniqueNames::default();
     let mut animations = Vec::new();
     for (index, clip) in clips.iter().enumerate() {
-        let refuse = |(code, why): (Code, String)| {
-            Diagnostic::new(output, code, format!("clip {}: {why}", index + 1))
-        };
         let mut animation = NewAnimation {
             name: clip.name.clone().map(|name| names.unique(name, index)),
             ..NewAnimation::default()
         };
+        writer.add(&mut animation, (index, clip), AtRest::LeftOut, edits)?;
+        if animation.channels.is_empty() {
+            let why = "nothing of it moves".to_owned();
+            return Err(writer.refuse(index, (Code::NothingToAnimate, why)).into());
+        }
+        animations.push(serde_json::to_string(&animation).map_err(std::io::Error::from)?);
+    }
+    match json.array("animations") {
+        Some(array) => edits.replace(array, format!("[{}]", animations.join(","))),
+        None => animations.into_iter().for_each(|animation| {
+            edits.append_to("animations", animation);
+        }),
+    }
+    Ok(writer.bytes.into_bytes())
+}
+
+/// Replaces the channels of joints in the animations of a file by the keys of clips, each in the animation of its index.
+/// Everything else of the animations stays: names, morph weights, and other animations. Returns the new bytes, for the next
+/// buffer view.
+///
+/// # Errors
+/// As [`replace_animations`].
+pub(super) fn replace_joints(
+    reader: &GltfReader<'_>,
+    nodes: &Nodes,
+    clips: &[&Motion],
+    output: &str,
+    edits: &mut Edits<'_>,
+) -> Result<Vec<u8>, WriteError> {
+    let mut writer = ChannelWriter::new(nodes, output, edits);
+    let entries = reader.json.entries("animations");
+    for clip in clips {
+        let pointer = format!("/animations/{}", clip.index);
+        let Some(&raw) = entries.get(clip.index) else {
+            continue;
+        };
+        let before: Animation<'_> = reader.json.typed(raw, &pointer)?;
+        let (mut channels, mut samplers) = (Vec::new(), Vec::new());
+        let mut moves_joints = false;
+        for raw in &before.channels {
+            let channel: Channel = reader.json.typed(raw, &pointer)?;
+            let moved = channel.target.moves();
+            if moved.is_some_and(|(_, path)| path != TargetPath::Weights) {
+                moves_joints = true;
+                continue;
+            }
+            let sampler = samplers.iter().position(|&kept| kept == channel.sampler);
+            let sampler = sampler.unwrap_or_else(|| {
+                samplers.push(channel.sampler);
+                samplers.len() - 1
+            });
+            let members: JsonMembers<'_> = reader.json.typed(raw, &pointer)?;
+            channels.push(object(&members, &[("sampler", sampler.to_string())]));
+        }
+        if !moves_joints {
+            continue;
+        }
+        let mut animation = NewAnimation::default();
+        writer.add(&mut animation, (clip.index, clip), AtRest::LeftOut, edits)?;
+        if animation.channels.is_empty() {
+            writer.add(&mut animation, (clip.index, clip), AtRest::Written, edits)?;
+        }
+        let kept = samplers.len();
+        let kept_samplers = samplers.iter();
+        let kept_samplers = kept_samplers.filter_map(|&sampler| before.samplers.get(sampler));
+        let mut samplers: Vec<String> = kept_samplers.map(|raw| raw.get().to_owned()).collect();
+        for mut channel in animation.channels {
+            channel.sampler += kept;
+            channels.push(serde_json::to_string(&channel).map_err(std::io::Error::from)?);
+        }
+        for sampler in animation.samplers {
+            samplers.push(serde_json::to_string(&sampler).map_err(std::io::Error::from)?);
+        }
+        let members: JsonMembers<'_> = reader.json.typed(raw, &pointer)?;
+        let lists = [("channels", channels), ("samplers", samplers)];
+        let lists = lists.map(|(name, list)| (name, format!("[{}]", list.join(","))));
+        edits.replace(raw, object(&members, &lists));
+    }
+    Ok(writer.bytes.into_bytes())
+}
+
+/// The text of an object with other values of some members.
+fn object(members: &JsonMembers<'_>, others: &[(&str, String)]) -> String {
+    let text = |(name, value): &(String, &RawValue)| {
+        let other = others.iter().find(|(other, _)| other == name);
+        let value = other.map_or(value.get(), |(_, value)| value);
+        format!("{}:{value}", serde_json::Value::from(name.as_str()))
+    };
+    let members: Vec<String> = members.0.iter().map(text).collect();
+    format!("{{{}}}", members.join(","))
+}
+
+/// What becomes of channels that only repeat the rest pose.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum AtRest {
+    LeftOut,
+    Written,
+}
+
+/// Writes the keys of clips as channels, whose tracks are the nodes of their names.
+struct ChannelWriter<'a> {
+    nodes: HashMap<&'a str, usize>,
+    /// The name of the file in messages.
+    output: &'a str,
+    bytes: KeyBytes,
+}
+
+impl<'a> ChannelWriter<'a> {
+    fn new(nodes: &'a Nodes, output: &'a str, edits: &Edits<'_>) -> Self {
+        Self {
+            nodes: (0..nodes.count())
+                .map(|node| (nodes.name(node), node))
+                .collect(),
+            output,
+            bytes: KeyBytes::new(edits),
+        }
+    }
+
+    fn refuse(&self, index: usize, (code, why): (Code, String)) -> Diagnostic {
+        Diagnostic::new(self.output, code, format!("clip {}: {why}", index + 1))
+    }
+
+    /// Adds the channels of the clip with this index.
+    fn add(
+        &mut self,
+        animation: &mut NewAnimation,
+        (index, clip): (usize, &Motion),
+        at_rest: AtRest,
+        edits: &mut Edits<'_>,
+    ) -> Result<(), Diagnostic> {
         for track in 0..clip.set.track_count() {
             let name = clip.set.track_name(track);
-            let Some(&node) = named.get(&*name) else {
+            let Some(&node) = self.nodes.get(&*name) else {
                 let why = format!("no node of the file is called `{name}`");
-                return Err(refuse((Code::NothingToAnimate, why)).into());
+                return Err(self.refuse(index, (Code::NothingToAnimate, why)));
             };
             for path in [
                 TargetPath::Rotation,
@@ -100,12 +227,14 @@ pub(super) fn replace_animations(
                 let Some(keys) = WrittenKeys::of(clip, track, path) else {
                     continue;
                 };
-                if keys.times.len() < 2 && repeats_rest(clip, track, path) {
+                let is_at_rest = keys.times.len() < 2 && repeats_rest(clip, track, path);
+                if is_at_rest && at_rest == AtRest::LeftOut {
                     continue;
                 }
-                let times = f32_times(clip.set.track_count(), &keys.times).map_err(refuse)?;
-                let input = bytes.input(&times, edits);
-                let output = bytes.output(&keys, path, edits);
+                let times = f32_times(clip.set.track_count(), &keys.times)
+                    .map_err(|why| self.refuse(index, why))?;
+                let input = self.bytes.input(&times, edits);
+                let output = self.bytes.output(&keys, path, edits);
                 animation.channels.push(NewChannel {
                     sampler: animation.samplers.len(),
                     target: NewTarget {
@@ -120,19 +249,8 @@ pub(super) fn replace_animations(
                 });
             }
         }
-        if animation.channels.is_empty() {
-            let why = "nothing of it moves".to_owned();
-            return Err(refuse((Code::NothingToAnimate, why)).into());
-        }
-        animations.push(serde_json::to_string(&animation).map_err(std::io::Error::from)?);
+        Ok(())
     }
-    match json.array("animations") {
-        Some(array) => edits.replace(array, format!("[{}]", animations.join(","))),
-        None => animations.into_iter().for_each(|animation| {
-            edits.append_to("animations", animation);
-        }),
-    }
-    Ok(bytes.into_bytes())
 }
 
 /// Whether the first key of a channel is the rest pose.
@@ -147,8 +265,10 @@ fn repeats_rest(clip: &Motion, track: usize, path: TargetPath) -> bool {
     };
     match path {
         TargetPath::Rotation => clip.set.track(track).keys.first() == Some(&joint.rest.rotation),
-        TargetPath::Translation => vector(Channel::Translation) == Some(joint.rest.translation),
-        TargetPath::Scale => vector(Channel::Scale) == Some(joint.rest.scale),
+        TargetPath::Translation => {
+            vector(VectorChannel::Translation) == Some(joint.rest.translation)
+        }
+        TargetPath::Scale => vector(VectorChannel::Scale) == Some(joint.rest.scale),
         TargetPath::Weights => false,
     }
 }

@@ -167,6 +167,16 @@ impl Document for GltfDocument {
     ) -> Result<Vec<Diagnostic>, WriteError> {
         self.rewrite(&Change::Animations(clips), options, path, out)
     }
+
+    fn write_joints(
+        &self,
+        clips: &[&Motion],
+        options: &MotionOptions,
+        path: &Path,
+        out: &mut dyn Write,
+    ) -> Result<Vec<Diagnostic>, WriteError> {
+        self.rewrite(&Change::Joints(clips), options, path, out)
+    }
 }
 
 /// The parts that are written other than they were read.
@@ -175,6 +185,8 @@ enum Change<'a> {
     Keys(&'a [(usize, SampledClip<'a>)]),
     /// All animations.
     Animations(&'a [&'a Motion]),
+    /// The channels of joints in the animations that these clips were read from.
+    Joints(&'a [&'a Motion]),
 }
 
 impl GltfDocument {
@@ -202,7 +214,7 @@ impl GltfDocument {
         };
         let more = match change {
             Change::Keys(clips) => self.baked(clips).map(sample_bytes).sum(),
-            Change::Animations(clips) => character::key_bytes(clips),
+            Change::Animations(clips) | Change::Joints(clips) => character::key_bytes(clips),
         };
         check_length(&json, data.length_with(more))?;
         if !self.container.is_glb() && !is_text {
@@ -213,17 +225,15 @@ impl GltfDocument {
                 let quantize = options.quantize.is_some();
                 self.bake(&reader, (clips, quantize), &mut edits, &mut data)?
             }
-            Change::Animations(clips) => {
+            Change::Animations(clips) | Change::Joints(clips) => {
                 let nodes = Nodes::read(&json)?;
-                let bytes = character::replace_animations(
-                    &reader,
-                    &nodes,
-                    clips,
-                    &options.name,
-                    &mut edits,
-                )?;
+                let replace = match change {
+                    Change::Joints(_) => character::replace_joints,
+                    _ => character::replace_animations,
+                };
+                let bytes = replace(&reader, &nodes, clips, &options.name, &mut edits)?;
                 data.append(&mut edits, &bytes);
-                true
+                !bytes.is_empty()
             }
         };
         let mut bin = data.finish(&json, &mut edits);
@@ -234,7 +244,7 @@ impl GltfDocument {
             let cut;
             (text, cut) = match change {
                 Change::Keys(_) => prune(&json, text, length),
-                Change::Animations(_) => prune_replaced(&json, text, length),
+                Change::Animations(_) | Change::Joints(_) => prune_replaced(&json, text, length),
             };
             bin = bin.map(|parts| cut.kept(&parts));
         }

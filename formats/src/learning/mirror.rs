@@ -1,5 +1,7 @@
 //! Mirrored poses: left becomes right.
 
+use std::collections::HashMap;
+
 use glam::{DQuat, DVec3};
 
 /// A point mirrored at the plane through the origin across an axis (0 for x, 1 for y, 2 for z). Velocities are mirrored
@@ -34,16 +36,40 @@ const SIDES: [[&str; 2]; 9] = [
 
 /// The partner of each name on the other side, by indices; a name without a partner is its own. Sides are words in
 /// names: `left_hip`, `RightArm`, `foot_l`, `Arm.L`, `L_Foot`, `Bip01 L Thigh`, `kLeftElbow`, or an initial: `LThumb`.
+/// Serial numbers at the ends of names may differ, as in `LeftHand_011` and `RightHand_08`, if no other names are equal
+/// without them.
 #[must_use]
 pub fn mirror_pairs<T: AsRef<str>>(names: &[T]) -> Vec<usize> {
-    let index_of = |name: String| names.iter().position(|other| other.as_ref() == name);
+    let mut by_name = HashMap::new();
+    // The names without serial numbers; `None` for those that several names have.
+    let mut by_bare_name: HashMap<&str, Option<usize>> = HashMap::new();
+    for (index, name) in names.iter().enumerate() {
+        let name = name.as_ref();
+        by_name.entry(name).or_insert(index);
+        let only = by_bare_name.entry(without_serial(name));
+        only.and_modify(|only| *only = None).or_insert(Some(index));
+    }
+    let renamed = |name| on_other_side(name).chain(by_initial(name));
     let partner = |name: &str| {
-        let mut renamed = on_other_side(name).chain(by_initial(name));
-        renamed.find_map(index_of)
+        let exact = renamed(name).find_map(|other| by_name.get(&*other).copied());
+        let bare = without_serial(name);
+        let is_only = by_bare_name.get(bare).is_some_and(Option::is_some);
+        let mut others = renamed(bare).filter(|_| is_only);
+        exact.or_else(|| others.find_map(|other| by_bare_name.get(&*other).copied().flatten()))
     };
     let names = names.iter().enumerate();
     let pairs = names.map(|(index, name)| partner(name.as_ref()).unwrap_or(index));
     pairs.collect()
+}
+
+/// A name without the number that some exporters write behind each: `LeftHand` of `LeftHand_011`.
+fn without_serial(name: &str) -> &str {
+    let bare = name.trim_end_matches(|c: char| c.is_ascii_digit());
+    let bare = match bare.len() < name.len() {
+        true => bare.strip_suffix(['_', '.', ' ']).unwrap_or(name),
+        false => name,
+    };
+    if bare.is_empty() { name } else { bare }
 }
 
 /// The indices of names with a word for a side that have no partner among these pairs. Initials do not count: many words

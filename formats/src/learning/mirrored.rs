@@ -40,14 +40,15 @@ pub struct MirrorReport {
 #[non_exhaustive]
 pub enum MirrorError {
     /// Two joints of the same name but for the side have parents that are no such pair.
-    #[error(
-        "`{joint}` is mirrored to `{partner}`, but the parent of one is not the partner of the other's parent"
-    )]
+    #[error("{}", of_parents(joint, partner, parents))]
     Parents {
         /// A joint.
         joint: String,
-        /// Its partner.
+        /// Its partner, or itself.
         partner: String,
+        /// The parent of the joint and the parent of its partner; of a joint without a partner, its parent and the partner of
+        /// that. `None` for a joint without a parent.
+        parents: [Option<String>; 2],
     },
     /// A joint has a scale that differs by axis, and its axes at rest are not those of its partner.
     #[error(
@@ -65,7 +66,9 @@ pub enum MirrorError {
     },
     /// Two joints turn or move along axes that are no mirror images.
     #[error(
-        "the joints `{joint}` and `{partner}` do not move along mirrored axes; is the axis from left to right another?"
+        "{} mirrored {}; is the axis from left to right another? It is y for robots that face x",
+        if joint == partner { format!("the joint `{joint}` does not move along its own") } else { format!("the joints `{joint}` and `{partner}` do not move along") },
+        if joint == partner { "axis" } else { "axes" }
     )]
     Axes {
         /// A joint.
@@ -88,6 +91,25 @@ pub enum MirrorError {
     /// A mirrored key is not valid.
     #[error(transparent)]
     Track(#[from] TrackError),
+}
+
+/// Why the parents of two joints do not allow that the joints are partners.
+fn of_parents(joint: &str, partner: &str, parents: &[Option<String>; 2]) -> String {
+    let named = |parent: &Option<String>| match parent {
+        Some(parent) => format!("`{parent}`"),
+        None => "none".to_owned(),
+    };
+    let [first, second] = [0, 1].map(|side| named(&parents[side]));
+    match joint == partner {
+        true => format!(
+            "`{joint}` has no partner, but its parent {first} is mirrored to {second}; rename the joints, so that each joint \
+             below one side has a partner on the other"
+        ),
+        false => format!(
+            "`{joint}` and `{partner}` are a pair by their names, but their parents {first} and {second} are none; rename the \
+             joints, so that the parents of a pair are one joint, or differ only in the side, such as left and right"
+        ),
+    }
 }
 
 /// A vector across the axes of a skeleton that is shorter than this part of a whole turn's is rounding.
@@ -115,9 +137,14 @@ pub fn mirrored(clip: &Motion, mirror: Mirror<'_>) -> Result<(Motion, MirrorRepo
         .filter(|_| !clip.is_world)
         .find(|&joint| parent(partners[joint]) != of_partner(joint));
     if let Some(joint) = strange {
+        let other = match partners[joint] == joint {
+            true => of_partner(joint),
+            false => parent(partners[joint]),
+        };
         return Err(MirrorError::Parents {
             joint: names[joint].clone(),
             partner: names[partners[joint]].clone(),
+            parents: [parent(joint), other].map(|it| it.map(|it| names[it].clone())),
         });
     }
     let robot = mirror.tree.map(|tree| RobotAtRest::new(tree, axis));

@@ -78,8 +78,8 @@ pub struct FeatureRequest {
     pub window: usize,
     /// The axis across the mirror: 0 for x, 1 for y, 2 for z.
     pub mirror_axis: usize,
-    /// The joints of HumanML3D, in its order, which are Kimodo's too.
-    pub humanml3d_joints: Option<[usize; HUMANML3D_JOINTS]>,
+    /// The joints of HumanML3D, in its order, which are Kimodo's too; or why they are not known, as the end of a sentence.
+    pub humanml3d_joints: Result<[usize; HUMANML3D_JOINTS], String>,
     /// How many frames there are in a second.
     pub rate: FrameRate,
 }
@@ -88,7 +88,14 @@ impl FeatureRequest {
     /// The joints of SMPL that a set needs.
     fn joints_of(&self, set: FeatureSet) -> Result<[usize; HUMANML3D_JOINTS], FeatureError> {
         let set = set.name();
-        self.humanml3d_joints.ok_or(FeatureError::NoJoints { set })
+        if self.ground != Ground::Y {
+            return Err(FeatureError::UpAxis { set });
+        }
+        let no_joints = |reason: &String| FeatureError::NoJoints {
+            set,
+            reason: reason.clone(),
+        };
+        self.humanml3d_joints.as_ref().copied().map_err(no_joints)
     }
 }
 
@@ -110,16 +117,19 @@ pub struct FeatureArray {
 #[non_exhaustive]
 pub enum FeatureError {
     /// A set needs joints that the skeleton does not have.
-    #[error(
-        "{set} needs the 22 joints of SMPL, and the joints are not those of a known human skeleton"
-    )]
+    #[error("{set} needs the 22 joints of SMPL: {reason}")]
     NoJoints {
         /// The name of the set.
         set: &'static str,
+        /// Why they are not known, as the end of a sentence.
+        reason: String,
     },
-    /// Kimodo's features are of bodies that stand along y.
-    #[error("kimodo needs y up, and z points up (--up-axis y)")]
-    UpAxis,
+    /// HumanML3D and Kimodo have bodies that stand along y.
+    #[error("{set} needs y up, and z points up (--up-axis y)")]
+    UpAxis {
+        /// The name of the set.
+        set: &'static str,
+    },
     /// Poses without features.
     #[error(transparent)]
     Humanml3d(#[from] Humanml3dError),
@@ -213,9 +223,6 @@ pub fn feature_arrays(
             }
             FeatureSet::Kimodo => {
                 let order = request.joints_of(*set)?;
-                if request.ground != Ground::Y {
-                    return Err(FeatureError::UpAxis);
-                }
                 let at = |frame: usize| order.map(|joint| frame * joints + joint);
                 let positions = (0..frames).map(|frame| at(frame).map(|at| poses.positions[at]));
                 let rotations = (0..frames).map(|frame| at(frame).map(|at| poses.rotations[at]));

@@ -31,6 +31,15 @@ tumble::names! {
 }
 
 impl UpAxis {
+    /// The unit vector along this axis.
+    #[must_use]
+    pub fn direction(self) -> DVec3 {
+        match self {
+            Self::Y => DVec3::Y,
+            Self::Z => DVec3::Z,
+        }
+    }
+
     /// The rotation about x by 90° that makes this axis the up axis, for [`adjust`]: from z up to y up, or from y up
     /// to z up. Its components are constants, because the sines of different systems differ in the last bit.
     #[must_use]
@@ -46,10 +55,7 @@ impl UpAxis {
     /// rotation is [`rotation`](Self::rotation).
     #[must_use]
     pub fn rotation_from(self, space: Option<Space>) -> DQuat {
-        let axis = match self {
-            Self::Y => DVec3::Y,
-            Self::Z => DVec3::Z,
-        };
+        let axis = self.direction();
         let quarter = |axis: DVec3| {
             let [x, y, z] = (axis * FRAC_1_SQRT_2).to_array();
             DQuat::from_xyzw(x, y, z, FRAC_1_SQRT_2)
@@ -75,16 +81,15 @@ pub fn adjust_all(loaded: &mut Loaded, scale: f64, up: Option<UpAxis>) -> Result
     }
     for clip in &mut loaded.clips {
         *clip = adjust(clip, scale, rotation)?;
+        if let (Some(body), Some(up)) = (&mut clip.body, up) {
+            body.up = Some(up.direction());
+        }
     }
     if let Some(length) = &mut loaded.box_length {
         *length *= scale;
     }
     loaded.space = loaded.space.map(|space| Space {
-        up: match up {
-            Some(UpAxis::Y) => DVec3::Y,
-            Some(UpAxis::Z) => DVec3::Z,
-            None => space.up,
-        },
+        up: up.map_or(space.up, UpAxis::direction),
         metres: space.metres / scale,
     });
     loaded.adjustment = Some(Adjustment::Space);
@@ -92,7 +97,8 @@ pub fn adjust_all(loaded: &mut Loaded, scale: f64, up: Option<UpAxis>) -> Result
 }
 
 /// Multiplies all translations of a clip by `scale` and rotates all roots by `rotation`: keys, tangents and rest
-/// poses. If the clip's poses are relative to the world, every track is a root. The computation is in f64; each
+/// poses. If the clip's poses are relative to the world, every track is a root. The rest rotations of an SMPL body stay as
+/// they are, because they are those of its model, whose axes do not depend on the world. The computation is in f64; each
 /// result is rounded to f32 once.
 ///
 /// # Errors
@@ -108,6 +114,7 @@ pub fn adjust(clip: &Motion, scale: f64, rotation: DQuat) -> Result<Motion, Trac
     }
     if let Some(body) = &mut adjusted.body {
         body.pelvis = (rotation * (body.pelvis.as_dvec3() * scale)).as_vec3();
+        body.up = body.up.map(|up| rotation * up);
     }
     for (index, track) in clip.set.tracks().enumerate() {
         let joint = clip.skeleton.get(index);
@@ -150,7 +157,10 @@ pub fn adjust(clip: &Motion, scale: f64, rotation: DQuat) -> Result<Motion, Trac
             joint.rest = Transform {
                 translation: (exactly(before + joint.rest.translation.as_dvec3()) - origin)
                     .as_vec3(),
-                rotation: rotated(joint.rest.rotation),
+                rotation: match clip.body {
+                    Some(_) => joint.rest.rotation,
+                    None => rotated(joint.rest.rotation),
+                },
                 ..joint.rest
             };
         }

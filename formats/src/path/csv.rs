@@ -4,6 +4,7 @@ use glam::DVec3;
 
 use crate::diagnostic::{Code, Diagnostic, Location};
 use crate::path::{PathFormat, PathPoints};
+use crate::text::lines::refuse_lone_returns;
 use crate::text::number;
 
 /// The CSV format of paths: points as text.
@@ -36,6 +37,7 @@ fn read_text(file: &str, bytes: &[u8]) -> Result<PathPoints, Diagnostic> {
         fault.location = Some(Location::Text { line, column: 1 });
         fault
     };
+    refuse_lone_returns(file, bytes, Some(b'"'))?;
     let text = std::str::from_utf8(bytes)
         .map_err(|_| Diagnostic::new(file, Code::Encoding, "this is not UTF-8; save it as text"))?;
     let text = text.trim_start_matches('\u{feff}');

@@ -1,5 +1,6 @@
 //! Parts of a human body, and how skeletons call them.
 
+use glam::DVec3;
 use tumble::names;
 
 /// A part of a human body: the bones of VRM 1.0 without fingers, eyes and jaw.
@@ -225,6 +226,41 @@ pub fn recognise(
         }
         _ => Err(Vec::new()),
     }
+}
+
+/// Why a skeleton is not recognised, for a message: the parts that [`recognise`] found missing.
+#[must_use]
+pub fn missing_text(missing: &[&str]) -> String {
+    match missing {
+        [] => "two kinds of skeletons fit as well".to_owned(),
+        parts => format!("no joint has a known name for {}", parts.join(", ")),
+    }
+}
+
+/// The axis along which a body stands: that of the direction from the feet to the head, on average over the positions of
+/// all joints in some poses. `None` if no axis is clear, as if it crawls on all fours along a diagonal, or lies.
+#[must_use]
+pub fn standing_axis<P: AsRef<[DVec3]>>(
+    roles: &Roles,
+    poses: impl IntoIterator<Item = P>,
+) -> Option<DVec3> {
+    let [head, left, right] =
+        [Role::Head, Role::LeftFoot, Role::RightFoot].map(|role| roles.joint(role));
+    let (head, left, right) = (head?, left?, right?);
+    let height = |pose: P| {
+        let pose = pose.as_ref();
+        pose[head] - (pose[left] + pose[right]) / 2.0
+    };
+    let sum: DVec3 = poses.into_iter().map(height).sum();
+    let along = |axis: &DVec3| sum.dot(*axis).abs();
+    let (mut axes, by_length) = (DVec3::AXES, |a: &DVec3, b: &DVec3| {
+        along(b).total_cmp(&along(a))
+    });
+    axes.sort_by(by_length);
+    let [axis, second, _] = axes;
+    // The other axes are those of how it leans.
+    let is_clear = along(&axis) > 2.0 * along(&second);
+    is_clear.then(|| axis * sum.dot(axis).signum())
 }
 
 fn found(scheme: &Scheme, joint_names: &[String], parents: &[Option<usize>]) -> Roles {

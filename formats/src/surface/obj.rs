@@ -6,6 +6,7 @@ use glam::DVec3;
 
 use crate::diagnostic::{Code, Diagnostic};
 use crate::surface::{Polygons, Surface, SurfaceFormat, SurfaceKind};
+use crate::text::lines::refuse_lone_returns;
 
 /// The OBJ format: meshes as text.
 pub static FORMAT: SurfaceFormat = SurfaceFormat {
@@ -55,6 +56,7 @@ fn vertices_and_faces(text: &[u8]) -> Vec<u8> {
 /// # Errors
 /// When the text is invalid.
 pub fn read_obj(name: &str, text: &[u8]) -> Result<Polygons, Diagnostic> {
+    refuse_lone_returns(name, text, None)?;
     let options = tobj::LoadOptions {
         ignore_points: true,
         ignore_lines: true,

@@ -293,10 +293,7 @@ impl<R: BufRead> Lines<R> {
                 Code::Encoding,
                 "a NUL byte; this is not a text file".to_owned(),
             ),
-            Some('\r') => {
-                let message = "a carriage return inside the line; end lines with LF or CR LF";
-                (Code::Character, message.to_owned())
-            }
+            Some('\r') => (Code::Character, LONE_RETURN.to_owned()),
             Some('\u{a0}') => {
                 let message = "a no-break space; use plain blanks between numbers";
                 (Code::Character, message.to_owned())
@@ -313,6 +310,33 @@ impl<R: BufRead> Lines<R> {
         };
         Err(self.refuse(column, code, message))
     }
+}
+
+const LONE_RETURN: &str = "a carriage return inside the line; end lines with LF or CR LF";
+
+/// Refuses text in which a carriage return alone ends a line, as [`Lines`] does, for formats that other readers take apart:
+/// these would count all of it as one line. Between quotes, as in cells of CSV, it ends no line.
+pub(crate) fn refuse_lone_returns(
+    file: &str,
+    text: &[u8],
+    quote: Option<u8>,
+) -> Result<(), Diagnostic> {
+    let (mut line, mut start, mut is_quoted) = (1, 0, false);
+    for (index, &byte) in text.iter().enumerate() {
+        match byte {
+            b'\n' => (line, start) = (line + 1, index + 1),
+            b'\r' if !is_quoted && text.get(index + 1).is_some_and(|&next| next != b'\n') => {
+                let before = String::from_utf8_lossy(&text[start..index]);
+                let column = before.chars().count() as u64 + 1;
+                let mut refusal = Diagnostic::new(file, Code::Character, LONE_RETURN);
+                refusal.location = Some(Location::Text { line, column });
+                return Err(refusal);
+            }
+            _ if Some(byte) == quote => is_quoted = !is_quoted,
+            _ => {}
+        }
+    }
+    Ok(())
 }
 
 /// Whether a byte is printable ASCII or a tab.

@@ -38,10 +38,13 @@ pub(crate) fn scalar_motions(
 ) -> PyResult<ScalarMotions> {
     let ListArgument(clips) = clips;
     let method = method_named(method)?;
-    let names = clips.first().map(|clip| names_of(&clip.motion, contacts));
-    let names = names.unwrap_or_default();
+    let first = clips.first().map(|clip| &*clip.motion);
+    let names = first.map_or_else(Vec::new, |first| names_of(first, contacts));
     for listed in ListedClip::all(&clips) {
-        if let Some(reason) = difference(&names, &names_of(&listed.clip.motion, contacts)) {
+        let motion = &listed.clip.motion;
+        let of_names = difference(&names, &names_of(motion, contacts));
+        let of_kinds = || first.and_then(|first| other_kind(first, motion, &names));
+        if let Some(reason) = of_names.or_else(of_kinds) {
             return Ok((
                 None,
                 Vec::new(),
@@ -107,6 +110,18 @@ fn difference(first: &[String], names: &[String]) -> Option<String> {
     let extra = || names.iter().find(|name| !first.contains(name));
     missing.or_else(|| {
         extra().map(|name| format!("has a scalar `{name}`, and the first clip has none"))
+    })
+}
+
+/// The first scalar that is another quantity in a clip than in the first clip.
+fn other_kind(first: &Motion, motion: &Motion, names: &[String]) -> Option<String> {
+    let kind = |motion: &Motion, name: &str| Some(motion.scalar(scalar_of(motion, name)?.0).kind);
+    names.iter().find_map(|name| {
+        let [kind, expected] = [kind(motion, name)?, kind(first, name)?];
+        (kind != expected).then(|| {
+            let [kind, expected] = [kind.name(), expected.name()];
+            format!("has the scalar `{name}` of the kind `{kind}`, and the first clip of the kind `{expected}`")
+        })
     })
 }
 

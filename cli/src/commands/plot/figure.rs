@@ -56,6 +56,31 @@ pub(crate) struct Panel {
     pub(crate) level: Option<f64>,
 }
 
+impl Panel {
+    /// Whether the curves of two colours cover each other: no two points of the same place in them are further apart than a
+    /// line is wide. Only curves of as many points are compared.
+    pub(crate) fn coincide(&self, colours: [Colour; 2]) -> bool {
+        /// A line's width as a part of a panel's height, or of the radius of a ball.
+        const LINE: f64 = 0.006;
+        let height = match &self.axes {
+            PanelAxes::Plane { y, .. } => y.range.end - y.range.start,
+            PanelAxes::Sphere => 1.0,
+        };
+        let points = |colour: Colour| {
+            let of_colour = self
+                .curves
+                .iter()
+                .filter(move |curve| curve.colour == colour);
+            of_colour.flat_map(|curve| curve.pieces.iter().flatten())
+        };
+        let [first, second] = colours.map(points);
+        let is_near = |(one, other): (&(f64, f64), &(f64, f64))| {
+            one.0 == other.0 && (one.1 - other.1).abs() <= LINE * height
+        };
+        first.clone().count() == second.clone().count() && first.zip(second).all(is_near)
+    }
+}
+
 #[derive(Debug, Clone)]
 pub(crate) enum PanelAxes {
     Plane {

@@ -6,6 +6,7 @@ use glam::{Quat, Vec3};
 use tumble::{Error, SampleTimes};
 use tumble_formats::carried_mesh::CarriedMesh;
 use tumble_formats::motion::{Joint, Motion, Transform};
+use tumble_formats::sample::MethodChoice;
 use tumble_formats::world::{HierarchyError, world, world_matrices};
 use tumble_routes::mesh::Mesh;
 
@@ -126,7 +127,7 @@ impl Subject {
             }
         };
         Ok(Actor {
-            name: choice.method.name().to_owned(),
+            name: caption(choice.method),
             tracks,
             rotations,
             positions,
@@ -182,6 +183,14 @@ fn chain(clip: Motion) -> Motion {
     }
 }
 
+/// The words under a body of a clip: how it is interpolated.
+fn caption(method: MethodChoice) -> String {
+    match method.0 {
+        None => "interpolated as in the file".to_owned(),
+        Some(method) => method.name.to_owned(),
+    }
+}
+
 /// The bodies of a source, an actor for each maker, with their curves in the colour of ink, and what
 /// is around them.
 pub(super) fn travellers(
@@ -204,7 +213,10 @@ pub(super) fn travellers(
         let corners =
             poses.flat_map(|(&at, &rotation)| body.corners(rotation).map(|corner| at + corner));
         actors.push(Actor {
-            name: bodies.name,
+            name: match maker {
+                Maker::Frame(frame) => format!("{} frame", frame.name()),
+                Maker::Method(choice) => caption(choice.method),
+            },
             tracks: bodies.tracks,
             rotations: bodies.rotations,
             positions: bodies.positions,

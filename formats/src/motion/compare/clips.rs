@@ -335,7 +335,7 @@ impl ClipPair<'_> {
         in_world: bool,
     ) -> Result<ClipDifference, CompareError> {
         let (inputs, motions) = (self.inputs, self.clips);
-        let (scalar_pairs, missing_scalars) = self.scalar_pairs();
+        let (scalar_pairs, missing_scalars) = self.scalar_pairs()?;
         let found = self.matched_joints()?;
         if scalar_pairs.is_empty() {
             self.check_any_pair(&found)?;
@@ -503,7 +503,10 @@ impl ClipPair<'_> {
     }
 
     /// The scalars of one name in both clips, by their indices, and the names of those that only one clip has.
-    fn scalar_pairs(&self) -> (Vec<[usize; 2]>, [Vec<String>; 2]) {
+    ///
+    /// # Errors
+    /// When scalars of one name are of different kinds, so that their difference has no unit.
+    fn scalar_pairs(&self) -> Result<ScalarPairs, CompareError> {
         let names = self
             .clips
             .map(|clip| -> Vec<&str> { clip.scalar_keys().map(|keys| keys.name).collect() });
@@ -517,7 +520,16 @@ impl ClipPair<'_> {
         }
         let lone = names[1].iter().filter(|name| !names[0].contains(name));
         missing[1].extend(lone.map(|name| (*name).to_owned()));
-        (pairs, missing)
+        let kinds = |pair: &[usize; 2]| [0, 1].map(|side| self.clips[side].scalar(pair[side]).kind);
+        let mut others = pairs.iter().filter(|pair| kinds(pair)[0] != kinds(pair)[1]);
+        match others.next() {
+            None => Ok((pairs, missing)),
+            Some(pair) => Err(CompareError::ScalarKinds {
+                inputs: self.inputs.map(str::to_owned),
+                name: names[0][pair[0]].to_owned(),
+                kinds: kinds(pair),
+            }),
+        }
     }
 
     /// The seconds to add to a time of the first clip for the same time of the second. Their clocks count from
@@ -656,6 +668,9 @@ impl ClipPair<'_> {
         })
     }
 }
+
+/// The scalars of one name in two clips, and the names of those that only one has.
+type ScalarPairs = (Vec<[usize; 2]>, [Vec<String>; 2]);
 
 /// The joints of two clips, and which are the same.
 struct MatchedJoints {

@@ -7,6 +7,7 @@ mod tally;
 
 use tumble::{Error, JointMatchError};
 
+use crate::motion::scalars::ScalarKind;
 use crate::motion::world::HierarchyError;
 use crate::times::clock_text;
 
@@ -64,6 +65,20 @@ pub enum CompareError {
         inputs: [String; 2],
         /// Number of scalars of each clip.
         scalars: [usize; 2],
+    },
+    /// Scalars of one name are different quantities.
+    #[error(
+        "the scalar `{name}` is of the kind `{}` in {} and `{}` in {}, so their difference has no unit; --map reads the \
+         columns of tables and arrays as one kind: {name}=COLUMN:scalar:{}",
+        kinds[0].name(), inputs[0], kinds[1].name(), inputs[1], kinds[0].name()
+    )]
+    ScalarKinds {
+        /// Names of the clips in messages.
+        inputs: [String; 2],
+        /// Name of the scalar.
+        name: String,
+        /// The kind of the scalar in each clip.
+        kinds: [ScalarKind; 2],
     },
     /// The names do not tell the tracks apart, or a track has another parent.
     #[error("{error}{}", in_world(error))]

@@ -126,10 +126,21 @@ impl PlotSource<'_> {
             let of = |(name, colour): (&str, colours::Colour)| line(name.to_owned(), colour);
             NAMES.into_iter().zip(COMPONENTS).map(of).collect()
         } else {
-            let of = |one: &CurveChoice| {
-                line(one.method.name().to_owned(), colours::of_choice(one.method))
+            let of = |(index, one): (usize, &CurveChoice)| {
+                let (name, colour) = (one.method.name(), colours::of_choice(one.method));
+                // Later curves are drawn over earlier ones.
+                let mut over = self.choices[index + 1..].iter().rev();
+                let hidden_by = over.find(|other| {
+                    let other = colours::of_choice(other.method);
+                    panels.iter().all(|panel| panel.coincide([colour, other]))
+                });
+                let label = match hidden_by {
+                    Some(other) => format!("{name} (below {})", other.method.name()),
+                    None => name.to_owned(),
+                };
+                line(label, colour)
             };
-            self.choices.iter().map(of).collect()
+            self.choices.iter().enumerate().map(of).collect()
         };
         let drawn = match subject {
             PlotSubject::Speed(_) => None,
