@@ -27,7 +27,7 @@ use crate::batch::preview::PlannedWork;
 use crate::batch::target::ResultTarget;
 use crate::commands::features::mirror_axis;
 use crate::messages::exit::{ALL_INPUTS, Failure};
-use crate::messages::words;
+use crate::messages::{names, words};
 
 /// Convert motion files to another format, without resampling
 #[derive(Debug, Args)]
@@ -79,7 +79,6 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     check_range(arguments.start, arguments.end)?;
     let files = arguments.inputs.gather(false)?;
     let asked = arguments.dialect.format(&arguments.results)?;
-    arguments.inputs.reading.robot()?;
     let options = arguments.command_line.options().of_command("convert");
     let reader = arguments.inputs.clone();
     let work = PlannedWork {
@@ -147,16 +146,16 @@ impl Arguments {
             .map_err(failed)
     }
 
-    /// The requested part of a clip, mirrored if that is asked for.
+    /// The requested part of a clip, mirrored if that is asked for, and how many of its joints change their sides.
     fn mirrored_part<'a>(
         &self,
         work: &ClipWork,
         clip: &'a Motion,
-    ) -> Result<Cow<'a, Motion>, Failure> {
+    ) -> Result<(Cow<'a, Motion>, Option<String>), Failure> {
         let name = &*work.name;
         let part = self.part(name, clip)?;
         let Some(axis) = self.mirror else {
-            return Ok(part);
+            return Ok((part, None));
         };
         let robot = self.inputs.reading.robot()?;
         let tree = robot.as_ref().map(|robot| &robot.tree);
@@ -177,7 +176,12 @@ impl Arguments {
                 printable(&joint),
                 100.0 * apart
             );
-            work.warn(Diagnostic::new(name, Code::NotSymmetric, message));
+            let warning = Diagnostic::new(name, Code::NotSymmetric, message);
+            let several = work.clips().len() > 1;
+            words::warn_of(match several {
+                true => warning.inside(names::clip(clip)),
+                false => warning,
+            });
         }
         let pairs = words::count(report.pairs.len(), "pair");
         let alone = match report.alone.len() {
@@ -185,10 +189,8 @@ impl Arguments {
             1 => format!("`{}` is", printable(&report.alone[0])),
             count => format!("{count} joints are"),
         };
-        words::note(&format!(
-            "{name}: {pairs} of joints change their sides; {alone} mirrored in place"
-        ));
-        Ok(Cow::Owned(mirrored))
+        let changed = format!("{pairs} of joints change their sides and {alone} mirrored in place");
+        Ok((Cow::Owned(mirrored), Some(changed)))
     }
 
     fn convert(&self, work: &ClipWork) -> Result<EvaluatedResult, Failure> {
@@ -199,7 +201,9 @@ impl Arguments {
         let loaded = &work.input.loaded;
         let document = document_to_rewrite(work, self.makes_new(target))?;
         let parts = clips.iter().map(|&clip| self.mirrored_part(work, clip));
-        let parts: Vec<Cow<'_, Motion>> = parts.collect::<Result<_, Failure>>()?;
+        let parts: Vec<_> = parts.collect::<Result<_, Failure>>()?;
+        let (parts, changed): (Vec<Cow<'_, Motion>>, Vec<Option<String>>) =
+            parts.into_iter().unzip();
         let is_whole = (self.start, self.end) == (None, None) && self.mirror.is_none();
         let is_copy = document.is_some() && is_whole && !self.inputs.reading.changes_keys();
         let options = MotionOptions {
@@ -217,16 +221,17 @@ impl Arguments {
             Some(document) if replaces => {
                 if parts.iter().any(|part| part.set.scalar_count() > 0) {
                     let message = "the weights of morph targets are left out".to_owned();
-                    work.warn(Diagnostic::new(name, Code::NoRoom, message));
+                    words::warn_of(Diagnostic::new(name, Code::NoRoom, message));
                 }
                 let all: Vec<&Motion> = parts.iter().map(AsRef::as_ref).collect();
                 target.write_motion(|out| {
                     document.write_instead(&all, &options, target.path(), out)
                 })?
             }
-            document => write_keys(name, &parts, document, &options, target)?,
+            document => write_keys(work, &parts, document, &options)?,
         };
-        let done = format!("{}, {}", words::count(parts.len(), "clip"), keys(&parts),);
+        let clips = words::count(parts.len(), "clip");
+        let done = format!("{clips}, {}{}", keys(&parts), mirrored_text(&parts, &changed));
         Ok(work.result(written, &done, None))
     }
 
@@ -244,7 +249,8 @@ impl Arguments {
             );
             return Err(Failure::usage(message));
         };
-        let part = self.mirrored_part(work, clip)?;
+        let (part, changed) = self.mirrored_part(work, clip)?;
+        let changed = mirrored_text(std::slice::from_ref(&part), &[changed]);
         let times = part.key_times();
         let rate = part.rate.or_else(|| part.rate_of_keys());
         let spaced = rate.filter(|rate| {
@@ -263,12 +269,12 @@ impl Arguments {
         let found = self
             .dialect
             .evaluate(dialect, &robot, (name, &part), &frames, |run| run(&engine))?;
-        let notes = vec![("input", name.to_owned())];
+        let notes = vec![("input", work.origin())];
         let (written, report) =
             self.dialect
                 .write(dialect, &robot, (work, &part), (&found, frames.rate), notes)?;
         let done = format!(
-            "{}, {}",
+            "{}, {}{changed}",
             words::count(found.times.len(), "frame"),
             report.text()
         );
@@ -281,6 +287,18 @@ impl Arguments {
         let chooses = self.inputs.reading.chooses_animation() && several;
         makes_new(&self.inputs).or(chooses.then_some("one animation makes"))
     }
+}
+
+/// `; 6 pairs of joints change their sides and no joint is mirrored in place`: of each animation by its name, where they
+/// differ.
+fn mirrored_text(parts: &[Cow<'_, Motion>], changed: &[Option<String>]) -> String {
+    let differ = changed.windows(2).any(|pair| pair[0] != pair[1]);
+    let texts = changed.iter().flatten().zip(parts);
+    let texts = texts.map(|(text, part)| match differ {
+        true => format!("; {}: {text}", names::clip(part)),
+        false => format!("; {text}"),
+    });
+    texts.take(if differ { parts.len() } else { 1 }).collect()
 }
 
 /// `30 keys (25 of rotations)`: of all channels of some clips, and those that `tumble info` counts.

@@ -20,6 +20,7 @@ use tumble_formats::robot::{
 };
 use tumble_formats::sample::{ChannelMethods, MethodChoice};
 use tumble_formats::world::world;
+use tumble_formats::{Code, Diagnostic};
 
 use crate::arguments::input::Inputs;
 use crate::arguments::interpolation::method_argument;
@@ -136,7 +137,6 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         );
         return Err(Failure::usage(message));
     }
-    arguments.inputs.reading.robot()?;
     let options = arguments.command_line.options().of_command("features");
     let reader = arguments.inputs.clone();
     let work = PlannedWork {
@@ -160,11 +160,12 @@ fn warn_of_other_rate(name: &str, rate: FrameRate) {
     /// Frames a second of HumanML3D.
     const RATE: u64 = 20;
     if FrameRate::new(RATE, 1).is_ok_and(|of_set| of_set != rate) {
-        words::warning(&format!(
-            "{name}: HumanML3D has {RATE} frames a second, and its numbers are steps from frame to frame; these are of \
-             {} (--fps {RATE})",
+        let message = format!(
+            "HumanML3D has {RATE} frames a second, and its numbers are steps from frame to frame; these are of {} \
+             (--fps {RATE})",
             rate.in_words()
-        ));
+        );
+        words::warn_of(Diagnostic::new(name, Code::SetRate, message));
     }
 }
 
@@ -177,10 +178,11 @@ fn warn_of_other_unit(name: &str, set: &str, poses: &WorldFrames) {
     let high = first.iter().copied().reduce(DVec3::max);
     let size = low.zip(high).map(|(low, high)| (high - low).max_element());
     if let Some(size) = size.filter(|size| !PERSON.contains(size)) {
-        words::warning(&format!(
-            "{name}: {set} is in metres, and the body is {} units tall; is it in another unit? (--scale)",
+        let message = format!(
+            "{set} is in metres, and the body is {} units tall; is it in another unit? (--scale)",
             words::decimals(size)
-        ));
+        );
+        words::warn_of(Diagnostic::new(name, Code::SetUnit, message));
     }
 }
 
@@ -188,11 +190,12 @@ fn warn_of_other_unit(name: &str, set: &str, poses: &WorldFrames) {
 fn warn_of_lost_partners(name: &str, names: &[String]) {
     let alone = without_partner(names, &mirror_pairs(names));
     if let Some(&first) = alone.first() {
-        words::warning(&format!(
-            "{name}: mirrored in place: {} with the name of a side and no partner on the other (the first: {})",
+        let message = format!(
+            "mirrored in place: {} with the name of a side and no partner on the other (the first: {})",
             words::count(alone.len(), "joint"),
             names[first]
-        ));
+        );
+        words::warn_of(Diagnostic::new(name, Code::LostPartner, message));
     }
 }
 

@@ -11,6 +11,7 @@ use tumble_routes::walkers::Plan;
 use crate::batch::target::{self, Destination};
 use crate::commands::route::arguments::Arguments;
 use crate::commands::route::tables::Participants;
+use crate::messages::warnings::RecordedWarning;
 use crate::messages::exit::Failure;
 
 /// A point of a route.
@@ -48,6 +49,7 @@ pub(super) struct RouteOutcome {
     pub(super) name: String,
     pub(super) ends: [DVec3; 2],
     pub(super) found: Result<(Route, Vec<RoutePoint>), String>,
+    pub(super) warnings: Vec<RecordedWarning>,
 }
 
 /// The destinations of routes, checked before any work.
