@@ -437,6 +437,7 @@ impl ShardRecord {
             result: None,
             diagnostic: None,
             causes: Vec::new(),
+            warnings: Vec::new(),
         });
     }
 

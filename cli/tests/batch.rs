@@ -448,7 +448,7 @@ fn results_without_inputs_are_told_and_pruned() {
     let check = run(folder, &["check", "out"]);
     assert_eq!(check.code, 8, "{}", check.words);
     let removed = "2 results have no input any more (the first: deep/b.npy); `tumble eval … --resume --prune` removes \
-                   those without inputs";
+                   them";
     assert!(check.words.contains(removed), "{}", check.words);
     succeed(folder, &["check", "out", "--results-only"]);
     // A file that no longer matches its line of the manifest stays.
@@ -901,4 +901,124 @@ fn two_hundred_kills_lose_nothing() {
     assert_eq!(last.code, 0, "{}", last.words);
     assert_eq!(tree(&out), whole);
     assert!(finished > 10, "only {finished} runs came to their end");
+}
+
+/// `check` names the command that made a directory, and no other command resumes it.
+#[test]
+fn a_directory_is_resumed_by_its_command() {
+    let temporary = sample_folder();
+    let folder = temporary.path();
+    let line = |text: &str| run(folder, &text.split(' ').collect::<Vec<_>>());
+    let convert = "convert a.dat b.dat -o out --to csv";
+    assert_eq!(line(convert).code, 0);
+    fs::write(folder.join("out/a.csv"), "other").unwrap();
+    let check = line("check out");
+    assert_eq!(check.code, 8, "{}", check.words);
+    let expected = "error: 1 of 2 results changed; `tumble convert … --resume` makes them again\n";
+    assert!(check.words.ends_with(expected), "{}", check.words);
+    let before = tree(&folder.join("out"));
+    for (refused, made) in [
+        ("eval a.dat b.dat -o out --to csv --resume", "out/a.csv"),
+        ("eval a.dat b.dat -o out --to csv --resume -n", "out/a.csv"),
+        ("eval a.dat b.dat -o out --to npy --resume", "out"),
+        (
+            "eval a.dat b.dat -o out --to csv --resume --shard 1/1",
+            "out/a.csv",
+        ),
+    ] {
+        let run = line(refused);
+        assert_eq!(run.code, 2, "{refused}: {}", run.words);
+        let expected = format!("error: {made}: was made by `tumble convert`");
+        assert!(run.words.contains(&expected), "{refused}: {}", run.words);
+        assert!(run.words.contains("another directory"), "{}", run.words);
+        assert_eq!(tree(&folder.join("out")), before);
+    }
+    assert_eq!(line(&format!("{convert} --resume")).code, 0);
+    assert_eq!(line("check out").code, 0);
+    // An input that failed has no options that name the command.
+    assert_eq!(
+        line("convert a.dat bad.dat -o out --to csv --resume").code,
+        3
+    );
+    let check = line("check out");
+    let expected = "`tumble convert … --resume` tries them again";
+    assert!(check.words.contains(expected), "{}", check.words);
+    assert_eq!(
+        line("eval a.dat b.dat -o out --to csv --resume --overwrite").code,
+        0
+    );
+}
+
+/// Each fault has its line, with what mends it.
+#[test]
+fn faults_that_are_found_have_a_line_each() {
+    let temporary = sample_folder();
+    let folder = temporary.path();
+    let line = |text: &str| run(folder, &text.split(' ').collect::<Vec<_>>());
+    assert_eq!(line("eval a.dat bad.dat b.dat -o out --shard 1/1").code, 3);
+    fs::write(folder.join("out/a.npy"), "other").unwrap();
+    fs::remove_file(folder.join("b.dat")).unwrap();
+    let check = line("check out");
+    let lines: Vec<&str> = check.words.lines().collect();
+    assert_eq!(lines.len(), 5, "{}", check.words);
+    for (line, expected) in lines[1..].iter().zip([
+        "error: 1 of 2 results changed; `tumble eval … --resume` makes them again",
+        "1 input failed (the first: bad.dat:2:1: error[E021]: ",
+        "1 input file not found (the first: b.dat), so changes in them are not known; run it in the directory",
+        "out: 1 of 1 shard is done; `tumble merge out` combines them",
+    ]) {
+        assert!(line.starts_with(expected), "{line}");
+    }
+    assert!(
+        lines[2].ends_with("; `tumble eval … --resume` tries them again"),
+        "{}",
+        lines[2]
+    );
+}
+
+/// An input that became a directory is none any more: its result is pruned.
+#[test]
+fn the_result_of_an_input_that_became_a_directory_is_pruned() {
+    let temporary = sample_folder();
+    let folder = temporary.path();
+    let line = |text: &str| run(folder, &text.split(' ').collect::<Vec<_>>());
+    fs::create_dir(folder.join("in")).unwrap();
+    for name in ["a", "b"] {
+        fs::copy(folder.join("a.dat"), folder.join(format!("in/{name}.dat"))).unwrap();
+    }
+    assert_eq!(line("eval in -o out").code, 0);
+    fs::remove_file(folder.join("in/b.dat")).unwrap();
+    fs::create_dir(folder.join("in/b.dat")).unwrap();
+    let check = line("check out");
+    let expected = "1 result has no input any more (the first: b.npy); `tumble eval … --resume --prune` removes them";
+    assert!(check.words.contains(expected), "{}", check.words);
+    let pruned = line("eval in -o out --resume --prune");
+    assert_eq!(pruned.code, 0, "{}", pruned.words);
+    assert!(
+        pruned.words.contains("b.npy: removed; its input is gone"),
+        "{}",
+        pruned.words
+    );
+    assert_eq!(names(&folder.join("out")), ["a.npy", "manifest.jsonl"]);
+    assert_eq!(line("check out").code, 0);
+}
+
+/// A file has the same results by whatever path it is named: they have its name without its folders.
+#[test]
+fn results_do_not_depend_on_the_path_of_the_input() {
+    let temporary = sample_folder();
+    let folder = temporary.path();
+    let line = |text: &str| run(folder, &text.split(' ').collect::<Vec<_>>());
+    for command in ["eval --fps 30", "smooth", "convert"] {
+        for (input, out) in [("a.dat", "one"), ("folder/../a.dat", "two")] {
+            let made = line(&format!("{command} {input} -o {out}.npz --overwrite"));
+            assert_eq!(made.code, 0, "{}", made.words);
+        }
+        let of = |name: &str| fs::read(folder.join(name)).unwrap();
+        assert!(of("one.npz") == of("two.npz"), "{command}");
+        let text = of("one.npz")
+            .windows(5 * 4)
+            .any(|it| it == "a\0\0\0.\0\0\0d\0\0\0a\0\0\0t\0\0\0".as_bytes());
+        assert!(text, "{command}: no name of the input");
+    }
 }

@@ -1205,3 +1205,128 @@ fn names_in_json_are_as_they_are() {
     let report = String::from_utf8(succeed(folder, &files).out).unwrap();
     assert!(report.starts_with("x/new\\nline.dat and y/"), "{report}");
 }
+
+/// Of directories the reason names only what differs: no pair is over the limit where a scalar is missing.
+#[test]
+fn directories_are_refused_for_the_right_reason() {
+    let temporary = sample_folder();
+    let folder = temporary.path();
+    let write = |name: &str, column: &str, value: &str| {
+        let path = folder.join(name);
+        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+        let text = format!("time,knee.scalar_angle,{column}.scalar_angle\n0,0,0\n1,{value},1\n");
+        std::fs::write(path, text).unwrap();
+    };
+    write("da/x.csv", "hip", "1");
+    write("db/x.csv", "toe", "1.05");
+    let of = |more: &str| {
+        let line = format!("compare da db {more}");
+        run(folder, &line.split(' ').collect::<Vec<_>>())
+    };
+    for (tolerance, reason) in [
+        (
+            "--tolerance 10",
+            "they differ: 1 pair with tracks or scalars in only one of the files\n",
+        ),
+        (
+            "--tolerance 1",
+            "they differ: 1 pair over the limit, 1 pair with tracks or scalars in only one of the files\n",
+        ),
+    ] {
+        let found = of(tolerance);
+        assert_eq!(found.code, 8, "{}", found.words);
+        assert!(found.words.ends_with(reason), "{}", found.words);
+    }
+    let empty = run(folder, &["compare", "empty", "empty"]);
+    assert!(
+        empty
+            .words
+            .contains("is a directory without files in readable formats"),
+        "{}",
+        empty.words
+    );
+    // A clip of tracks beside one of scalars has nothing to compare.
+    for files in [["a.dat", "da/x.csv"], ["da/x.csv", "a.dat"]] {
+        let found = run(folder, &[&["compare"][..], &files].concat());
+        let expected = "error: da/x.csv has only scalars, and none of them has the name of a scalar of a.dat\n";
+        assert!(
+            found.code == 4 && found.words.contains(expected),
+            "{}",
+            found.words
+        );
+    }
+}
+
+/// Options for joints and bounds of other quantities have no effect on scalars alone.
+#[test]
+fn options_without_effect_on_scalars_are_refused() {
+    let temporary = sample_folder();
+    let folder = temporary.path();
+    let write = |name: &str, kind: &str| {
+        let text = format!("time,knee.scalar_{kind}\n0,0\n1,1\n");
+        std::fs::write(folder.join(name), text).unwrap();
+    };
+    write("angle.csv", "angle");
+    write("plain.csv", "plain");
+    write("length.csv", "length");
+    for (line, code) in [
+        ("angle.csv --top 2", 2),
+        ("angle.csv --top 2 --json", 0),
+        ("angle.csv --world", 2),
+        ("angle.csv --worst-by distance", 2),
+        ("angle.csv --distance 1", 2),
+        ("length.csv --distance 1", 0),
+        ("length.csv --tolerance 1", 2),
+        ("plain.csv --tolerance 1", 2),
+        ("plain.csv --tolerance 0", 0),
+        ("angle.csv --tolerance 1", 0),
+    ] {
+        let words: Vec<&str> = line.split(' ').collect();
+        let found = run(folder, &[&["compare", words[0]][..], &words].concat());
+        assert_eq!(found.code, code, "{line}: {}", found.words);
+        if code == 2 {
+            let expected = format!(
+                "error: {} has no effect where only scalars are compared; ",
+                words[1]
+            );
+            assert!(found.words.contains(&expected), "{line}: {}", found.words);
+        }
+    }
+}
+
+/// In directories the order of the second input applies to the files that have a choice of orders.
+#[test]
+fn the_order_of_the_second_directory_applies_where_there_is_one() {
+    let temporary = sample_folder();
+    let folder = temporary.path();
+    for (side, components) in [("one", "0.6 0 0 0.8"), ("two", "0.8 0.6 0 0")] {
+        std::fs::create_dir(folder.join(side)).unwrap();
+        let tum = format!("0 0 0 0 {components}\n1 0 0 0 {components}\n");
+        std::fs::write(folder.join(side).join("p.tum"), tum).unwrap();
+        std::fs::copy(folder.join("a.dat"), folder.join(side).join("a.dat")).unwrap();
+    }
+    let line = [
+        "compare",
+        "one",
+        "two",
+        "--second-source-order",
+        "wxyz",
+        "--tolerance",
+        "1e-4",
+    ];
+    succeed(folder, &line);
+    assert_eq!(
+        run(folder, &["compare", "one", "two", "--tolerance", "1e-4"]).code,
+        8
+    );
+    for side in ["one", "two"] {
+        std::fs::remove_file(folder.join(side).join("p.tum")).unwrap();
+    }
+    let refused = run(folder, &line);
+    let expected = "--second-source-order has no effect on dat; it is for ";
+    assert!(
+        refused.code == 2 && refused.words.contains(expected),
+        "{}",
+        refused.words
+    );
+}

@@ -641,7 +641,7 @@ fn results_of_clips_that_are_gone_are_told_apart() {
     assert_eq!(check.code, 8, "{}", check.words);
     for part in [
         "out/hero.one.npz: its input in/hero.gltf has no such clip any more",
-        "2 of 3 results of clips that are gone; `tumble eval … --resume --prune` removes those of clips that are gone",
+        "2 of 3 results of clips that are gone; `tumble eval … --resume --prune` removes them",
     ] {
         says(&check, part);
     }

@@ -448,3 +448,215 @@ fn interrupted_batches_say_what_is_done() {
     let made = fs::read_dir(folder.path().join("out")).unwrap().count() - 1;
     assert_eq!((in_state("made"), in_state("pending")), (made, 2000 - made));
 }
+
+/// Folder with inputs that cause warnings.
+fn folder_of_warnings() -> tempfile::TempDir {
+    let temporary = sample_folder();
+    let write = |name: &str, text: &str| fs::write(temporary.path().join(name), text).unwrap();
+    write(
+        "lost.bvh",
+        "HIERARCHY\nROOT Hips\n{\nOFFSET 0 0 0\nCHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation \
+         Yrotation\nJOINT LeftHand\n{\nOFFSET 0 1 0\nCHANNELS 3 Zrotation Xrotation Yrotation\nEnd Site\n{\nOFFSET 0 1 \
+         0\n}\n}\n}\nMOTION\nFrames: 3\nFrame Time: 0.05\n0 0 0 0 0 0 0 0 0\n1 0 0 0 0 0 9 0 0\n2 0 0 0 0 0 0 9 0\n",
+    );
+    write("still.csv", "t,x,y,z\n0,0,0,0\n1,0,0,0\n");
+    write("long.dat", "# 1 2\n0 1 0 0 0\n1 0.8 0.6 0 0\n3 1 0 0 0\n");
+    write("short.dat", "# 1 1\n0 1 0 0 0\n1 0.8 0.6 0 0\n");
+    temporary
+}
+
+/// Every text in a JSON value that is a warning's message.
+fn recorded(value: &serde_json::Value, found: &mut Vec<String>) {
+    match value {
+        serde_json::Value::Object(members) => {
+            let warnings = members.get("warnings").and_then(|it| it.as_array());
+            let texts = warnings.into_iter().flatten();
+            let message = |it: &serde_json::Value| it["message"].as_str().map(str::to_owned);
+            found.extend(
+                texts.map(|it| message(it).unwrap_or_else(|| it.as_str().unwrap().to_owned())),
+            );
+            members.values().for_each(|value| recorded(value, found));
+        }
+        serde_json::Value::Array(values) => values.iter().for_each(|value| recorded(value, found)),
+        _ => {}
+    }
+}
+
+/// No command prints a warning that is not in its JSON, and `--quiet` leaves none out there.
+#[test]
+fn every_warning_that_is_printed_is_in_the_json() {
+    let temporary = folder_of_warnings();
+    let folder = temporary.path();
+    let hill = "generate --hill -o hill.obj";
+    succeed(folder, &words(hill));
+    for (line, expected) in [
+        (
+            "features lost.bvh --sets positions,mirror -o OUT.npz",
+            "W932",
+        ),
+        ("follow still.csv -o OUT.npy", "W601"),
+        ("smooth a.dat --fps 0.7 -o OUT.npy", "W017"),
+        ("smooth a.dat --edges loop -o OUT.npy", "W018"),
+        ("eval a.dat --fps 25 --end 3 -o OUT.npy", "W015"),
+        (
+            "eval long.dat --fps 4 --max-gap 1 --in-gaps hold -o OUT.npy",
+            "W016",
+        ),
+        (
+            "eval a.dat a.dat --fps 29.97 --exclude *_draft -o OUT",
+            "warning: a.dat: named twice",
+        ),
+        (
+            "eval a.dat --fps 29.97 --shard 1/1 -o OUT",
+            "warning: exactly 29.97",
+        ),
+        ("convert lost.bvh -o OUT.npy --tracks LeftHand", ""),
+        (
+            "verify a.dat antipodal.dat -m slerp --fps 5 --end 3 --device cpu",
+            "W015",
+        ),
+        ("info a.dat --exclude *_draft", "warning: --exclude"),
+        ("compare short.dat long.dat", "warning: "),
+        ("plot antipodal.dat -m slerp -o OUT.svg", "W012"),
+        (
+            "render antipodal.dat --size 32x32 --fps 1 -o OUT.gif",
+            "W012",
+        ),
+        ("view antipodal.dat --fps 5 -o OUT.html", "W012"),
+        (
+            "route hill.obj --start-point 1,9,1 --end-point 8,0,8 -o OUT.csv",
+            "warning: ",
+        ),
+        // A command that fails, and an input that does.
+        (
+            "eval a.dat --fps 29.97 -o old.npy",
+            "warning: exactly 29.97",
+        ),
+        (
+            "verify antipodal.dat -m slerp --start 5 --end 6 --before leave-out --after leave-out --device cpu",
+            "W012",
+        ),
+    ] {
+        let of = |out: &str, more: &[&str]| {
+            let line = line.replace("OUT", out);
+            run(folder, &[&words(&line)[..], more].concat())
+        };
+        let (loud, quiet) = (of("loud", &[]), of("quiet", &["--json", "-q"]));
+        assert_eq!(loud.code, quiet.code, "{line}: {}", loud.words);
+        assert!(loud.words.contains(expected), "{line}: {}", loud.words);
+        assert!(!quiet.words.contains("warning"), "{line}: {}", quiet.words);
+        let json: serde_json::Value = serde_json::from_slice(&quiet.out)
+            .unwrap_or_else(|error| panic!("{line}: {error}: {}", text(&quiet)));
+        let mut messages = Vec::new();
+        recorded(&json, &mut messages);
+        for printed in loud.words.lines().filter(|line| line.contains("warning")) {
+            let printed = printed.replace("loud", "quiet");
+            let is_recorded = messages.iter().any(|message| printed.contains(&**message));
+            assert!(is_recorded, "{line}: `{printed}` is not in {json:#}");
+        }
+    }
+}
+
+/// In a batch they are in the manifest too, also those of inputs that fail, and of shards; and they are summed up.
+#[test]
+fn manifests_have_every_warning_about_an_input() {
+    let temporary = folder_of_warnings();
+    let folder = temporary.path();
+    fs::create_dir(folder.join("in")).unwrap();
+    for name in ["a", "b", "c"] {
+        fs::copy(
+            folder.join("lost.bvh"),
+            folder.join(format!("in/{name}.bvh")),
+        )
+        .unwrap();
+    }
+    let features = "features in --sets positions,mirror -o out";
+    let made = succeed(folder, &words(features));
+    assert_eq!(made.words.matches("W932").count(), 1, "{}", made.words);
+    assert!(made.words.contains("W932 3 files: "), "{}", made.words);
+    let manifest = fs::read_to_string(folder.join("out/manifest.jsonl")).unwrap();
+    let warning = r#""warnings":[{"code":"W932","message":"mirrored in place: 1 joint with the name of a side and no partner on the other (the first: LeftHand)"}]"#;
+    assert_eq!(manifest.matches(warning).count(), 3, "{manifest}");
+    let quiet = succeed(folder, &words(&format!("{features} --overwrite --json -q")));
+    let json: serde_json::Value = serde_json::from_slice(&quiet.out).unwrap();
+    assert_eq!(json[2]["warnings"][0]["code"], "W932", "{json:#}");
+
+    // One that fails after its warning.
+    fs::create_dir(folder.join("some")).unwrap();
+    fs::copy(folder.join("antipodal.dat"), folder.join("some/a.dat")).unwrap();
+    fs::copy(folder.join("a.dat"), folder.join("some/b.dat")).unwrap();
+    let leaves_out = "eval some --start 1.5 --end 2 --after leave-out -q -o";
+    let failed = run(folder, &words(&format!("{leaves_out} one")));
+    assert_eq!(failed.code, 3, "{}", failed.words);
+    let manifest = fs::read_to_string(folder.join("one/manifest.jsonl")).unwrap();
+    let line = manifest
+        .lines()
+        .find(|line| line.contains(r#""state":"failed""#))
+        .unwrap();
+    assert!(line.contains(r#""warnings":[{"code":"W012""#), "{line}");
+    let part = run(folder, &words(&format!("{leaves_out} two --shard 1/1")));
+    assert_eq!(part.code, 3, "{}", part.words);
+    assert_eq!(run(folder, &words("merge two -q")).code, 3);
+    assert_eq!(tree(&folder.join("two")), tree(&folder.join("one")));
+}
+
+/// The lines of a source that print a warning which nothing records.
+fn unrecorded_warnings<'a>(file: &str, source: &'a str) -> Vec<&'a str> {
+    // The pipeline and its summary record warnings themselves; `load` prints errors of parts.
+    let records = [
+        "batch/pipeline.rs",
+        "batch/summary.rs",
+        "arguments/input.rs",
+    ];
+    let prints = |line: &&str| {
+        let prints_kept = line.contains("print_kept(") && !records.contains(&file);
+        let prints_note = [
+            "words::note(&warning",
+            "words::note(&fault",
+            "words::line(&warning",
+        ];
+        let beside = line.contains("stderr()") || line.contains("eprint");
+        prints_kept
+            || prints_note.iter().any(|print| line.contains(print))
+            || line.contains("words::note(&format!(\"{fault}")
+            || line.contains("words::note(&format!(\"{warning}")
+            || beside
+    };
+    match file.starts_with("messages/") {
+        true => Vec::new(),
+        false => source.lines().filter(prints).collect(),
+    }
+}
+
+/// Warnings go through the function that also keeps them for JSON and manifests.
+#[test]
+fn no_source_prints_a_warning_that_is_not_recorded() {
+    let sources = crate::program::root().join("cli/src");
+    let mut pending = vec![sources.clone()];
+    let mut found = Vec::new();
+    let mut count = 0;
+    while let Some(folder) = pending.pop() {
+        for entry in fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                pending.push(path);
+            } else if path.extension().is_some_and(|ending| ending == "rs") {
+                count += 1;
+                let file = path.strip_prefix(&sources).unwrap().to_str().unwrap();
+                let file = file.replace('\\', "/");
+                let source = fs::read_to_string(&path).unwrap();
+                let lines = unrecorded_warnings(&file, &source).into_iter();
+                found.extend(lines.map(|line| format!("{file}: {}", line.trim())));
+            }
+        }
+    }
+    assert!(count > 100, "{count} files");
+    assert!(found.is_empty(), "{}", found.join("\n"));
+    for wrong in [
+        "words::note(&warning.to_string());",
+        "words::print_kept(&loaded.warnings);",
+        "eprintln!(\"{warning}\");",
+    ] {
+        assert_eq!(unrecorded_warnings("commands/x.rs", wrong), [wrong]);
+    }
+}

@@ -162,8 +162,97 @@ fn a_lost_plan_is_named_and_written_again() {
     assert_eq!(fs::read(&plan).unwrap(), before);
     succeed(folder, &["merge", "out"]);
     assert_eq!(tree(&folder.join("out")), tree(&folder.join("one")));
+    // The file of a shard may be lost, too; and the plan may be cut, which says what to do.
+    for is_cut in [false, true] {
+        succeed(folder, &shard("out", &bytes, "1/1", &["--overwrite"]));
+        fs::remove_file(folder.join("out/manifest.d/00002.jsonl")).unwrap();
+        match is_cut {
+            true => fs::write(&plan, &before[..100]).unwrap(),
+            false => fs::remove_file(&plan).unwrap(),
+        }
+        if is_cut {
+            for line in ["merge out", "check out", "eval walks -o out --resume"] {
+                let line: Vec<&str> = line.split(' ').collect();
+                let refused = run(folder, &line);
+                assert_eq!(refused.code, 4, "{line:?}: {}", refused.words);
+                let expected = "; remove it; then `tumble eval … --shard 1/1 --resume`, with the same inputs and options, writes it again";
+                assert!(refused.words.contains(expected), "{}", refused.words);
+            }
+            fs::remove_file(&plan).unwrap();
+        }
+        let resumed = succeed(folder, &shard("out", &bytes, "1/1", &["--resume"]));
+        assert_eq!(
+            resumed.words.matches("4 results kept").count(),
+            2,
+            "{}",
+            resumed.words
+        );
+        succeed(folder, &["merge", "out"]);
+        assert_eq!(tree(&folder.join("out")), tree(&folder.join("one")));
+    }
     let merged = run(folder, &["merge", "nowhere"]);
     assert!(merged.code == 4 && merged.words.contains("nowhere: cannot be read: "));
+}
+
+/// A task that is queued again after its shards were merged changes nothing, also if an input of it had failed; one whose
+/// input has changed makes its shard.
+#[test]
+fn a_merged_directory_stays_complete() {
+    let (temporary, bytes) = library();
+    let folder = temporary.path();
+    for name in ["walks/03b.dat", "walks/deep/x.dat"] {
+        fs::copy(folder.join("bad.dat"), folder.join(name)).unwrap();
+    }
+    let parts = ["1/2", "2/2"];
+    for part in parts {
+        run(folder, &shard("out", &bytes, part, &[]));
+    }
+    assert_eq!(run(folder, &["merge", "out"]).code, 3);
+    let merged = tree(&folder.join("out"));
+    let mut failed = 0;
+    for part in parts {
+        let again = run(folder, &shard("out", &bytes, part, &["--resume"]));
+        assert!(again.code == 3, "{}", again.words);
+        assert!(
+            again.words.contains("are not tried again"),
+            "{}",
+            again.words
+        );
+        assert!(!again.words.contains("results made of"), "{}", again.words);
+        failed += again.words.matches("1 of 7 inputs failed").count();
+        assert_eq!(tree(&folder.join("out")), merged);
+    }
+    assert_eq!(failed, 2, "one in each part");
+    let json = run(
+        folder,
+        &shard("out", &bytes, "1/2", &["--resume", "--json"]),
+    );
+    let json: serde_json::Value = serde_json::from_slice(&json.out).unwrap();
+    let states: Vec<&str> = json
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|it| it["state"].as_str().unwrap())
+        .collect();
+    assert_eq!(
+        states.iter().filter(|it| **it == "kept").count(),
+        6,
+        "{states:?}"
+    );
+    fs::copy(folder.join("antipodal.dat"), folder.join("walks/01.dat")).unwrap();
+    run(folder, &shard("out", &bytes, "1/1", &["--resume"]));
+    assert!(folder.join("out/manifest.d/plan.json").exists());
+}
+
+/// A part of which there are no shards says so.
+#[test]
+fn a_part_without_shards_is_said() {
+    let (temporary, bytes) = library();
+    let folder = temporary.path();
+    let part = succeed(folder, &shard("out", &bytes, "1/4", &["--json"]));
+    let expected = "--shard 1/4: there are 3 shards, and none of them is of this part\n";
+    assert_eq!(part.words, expected);
+    assert_eq!(part.out, b"[]\n");
 }
 
 /// Merging finds results that are gone or cut, and leaves the shards as they are until these are made again.
@@ -210,6 +299,15 @@ fn resuming_looks_at_bytes() {
         2
     );
     let slerp = ["-m", "slerp", "--resume"];
+    let refused = run(folder, &shard("out", &bytes, "1/1", &slerp));
+    let expected = "out: has shards with another value of option --method; give it as they have it";
+    assert!(
+        refused.code == 2 && refused.words.contains(expected),
+        "{}",
+        refused.words
+    );
+    assert_eq!(tree(&folder.join("out")), before);
+    let slerp = ["-m", "slerp", "--overwrite"];
     let made = succeed(folder, &shard("out", &bytes, "1/1", &slerp));
     assert!(!made.words.contains("(already complete)"), "{}", made.words);
     succeed(folder, &["merge", "out"]);

@@ -322,6 +322,10 @@ codes! {
     HalfTurn = "W012", "neighbouring keys 180° apart", "Both directions of rotation are equally long; the stored signs decide.";
     EqualKeys = "W013", "a key given twice", "Two keys at one time with equal values; the second is left out.";
     AccelerationJumps = "W014" elsewhere, "an angular acceleration that jumps", "With the method `c2` the angular acceleration is continuous, except at these keys: no such curve was found, or it would rotate many times between two keys. There only the velocity is continuous. The usual cause is a very short interval next to a very long one. Add keys in the long interval, or use `-m bessel-overhauser`.";
+    OutsideKeys = "W015" elsewhere, "times outside the keys", "There the first or the last key is held, unless `--before` and `--after` say something else, as `cycle` or `continue`.";
+    InGaps = "W016" elsewhere, "times in gaps between keys", "The keys beside them are further apart than `--max-gap`. `--in-gaps` says whether such times are left out, held at the key before, or refused.";
+    EndLeftOut = "W017" elsewhere, "an end that is left out", "A smoothing kernel needs evenly spaced samples, and the last of them is before the end of the clip. A rate (`--fps`) with a frame at the end keeps it.";
+    OpenLoop = "W018" elsewhere, "a loop whose ends differ", "With `--edges loop` the last sample repeats the first. Here their rotations differ by more than rounding or a recording explains, so the clip is no loop, or not a whole one.";
     RequiredExtension = "W100", "an unknown required extension", "The animations are read without it; data that needs it is refused.";
     CubicOfOne = "W101", "a cubic of one key", "There is nothing to interpolate; the value is constant.";
     EmptySampler = "W102", "a sampler without keys", "Its target is not animated.";
@@ -358,6 +362,7 @@ codes! {
     ColumnsLeftOut = "W402", "columns that are left out", "Their names are not known, or a list has more numbers than `--map` uses. `--map` defines the meaning of columns.";
     RowsSorted = "W403", "rows that are not in the order of their times", "The rows of a track are sorted by time. If the clock was set back instead, so that sorting would mix two recordings, they are refused (E026).";
     FurtherNumbers = "W501", "further numbers after a pose", "A line of a trajectory has a time, a position and a quaternion, or the twelve numbers of a matrix in KITTI. Numbers after these, such as a covariance or velocities, are not read.";
+    BodyDirection = "W601" elsewhere, "a body without a clear direction", "A body on a path faces the direction of its motion. One that stands still on the whole path has none, and faces +z. If the roll that is left over at the end of a closed path is 180°, it can be removed in two directions.";
     FbxBeside = "W701", "content that is not motion", "Only nodes and their animation are read from FBX. Meshes, skins, materials and other content are not.";
     FbxProperties = "W702", "curves of other properties", "They animate something other than a transform, such as blend shapes, visibility or a lens.";
     FbxOutside = "W703", "keys outside the take", "An animation stack has a start and an end. Some curves have keys outside, which a player does not show.";
@@ -386,6 +391,9 @@ codes! {
     RotationsDropped = "W917" elsewhere, "rotations of joints that are lost", "Joints of the input move, but no joint of the target follows them. `tumble retarget` pairs the parts of the body, and other joints with the same name and the same joints above them. `--bones` pairs further joints by name.";
     CoarseAngles = "W918" elsewhere, "angles in coarse steps", "Keys are f32, whose steps grow with the number: 6e-5 rad at 512 rad, 5e-4 rad at 5 000 rad. Unwrapped angles are stored relative to a whole number of turns near the middle of their range, so an angle that grows to 10 000 rad has the steps of 5 000 rad. Where this matters, cut the file into shorter ones: each counts from its own middle. Velocities of such angles have errors of about one step per interval between keys.";
     OtherScalars = "W919" elsewhere, "scalars that are no joints of the robot", "The scalars of the file are in groups, such as `observation.state.` and `action.` of LeRobot, and the names of one group are those of the robot's joints. The others are left out. If a joint is in two groups, one of states and one of actions, the states count: the actions are what was commanded.";
+    SetRate = "W930" elsewhere, "another rate than that of a set of features", "HumanML3D has 20 frames a second, and its numbers are steps from frame to frame. At another rate they mean something else to models that were trained on it: `--fps 20`.";
+    SetUnit = "W931" elsewhere, "a body that is not in metres", "The numbers of this set of features are metres, and the body is much smaller or larger than a person. The file is probably in another unit, such as centimetres: `--scale 0.01`.";
+    LostPartner = "W932" elsewhere, "joints of a side without a partner", "Mirroring exchanges joints whose names differ in the side alone. These joints name a side, and there is none for the other, so they are mirrored in place.";
 }
 
 impl Code {

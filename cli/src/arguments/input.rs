@@ -96,6 +96,8 @@ impl Inputs {
         let gathered = GatheredInputs::new(&self.paths, &selection)?;
         let paths = gathered.paths();
         self.check_formats(&paths.iter().collect::<Vec<_>>())?;
+        // A thread may read the inputs; warnings about the robot are those of the command.
+        self.reading.robot()?;
         Ok(gathered)
     }
 
@@ -164,10 +166,11 @@ impl Inputs {
         Ok(self.gather(times_from_stdin)?.paths())
     }
 
-    /// Reads a keyframe file; its warnings go to standard error.
+    /// Reads a keyframe file, and warns of what is in it.
     pub(crate) fn load(&self, path: &Path) -> Result<Loaded, Failure> {
         let loaded = self.load_quietly(path)?;
-        print_warnings(&loaded);
+        loaded.warnings.iter().cloned().for_each(words::warn_of);
+        words::print_kept(&loaded.refused);
         Ok(loaded)
     }
 
@@ -189,7 +192,7 @@ impl Inputs {
         }
     }
 
-    /// As [`Inputs::load`], without printing its warnings.
+    /// As [`Inputs::load`], without warning.
     pub(crate) fn load_quietly(&self, path: &Path) -> Result<Loaded, Failure> {
         busy(&format!("reading {}", names::input(path)), || {
             self.read(path)
@@ -297,7 +300,7 @@ fn no_clips(path: &Path) -> Failure {
 }
 
 /// The failure of a directory that no files were found in.
-fn directory_failure(path: &Path) -> Failure {
+pub(crate) fn directory_failure(path: &Path) -> Failure {
     let refuse = |code, message: String| {
         Failure::input(
             &Diagnostic::new(path.display().to_string(), code, message),
@@ -315,11 +318,6 @@ fn directory_failure(path: &Path) -> Failure {
         endings.join(", ")
     );
     refuse(Code::NotAFile, message)
-}
-
-/// Prints the warnings of an input.
-pub(crate) fn print_warnings(loaded: &Loaded) {
-    words::warnings(loaded.warnings.iter().chain(&loaded.refused));
 }
 
 /// The failure of a command that works on one clip for a file with several.

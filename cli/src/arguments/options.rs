@@ -351,6 +351,35 @@ pub(crate) fn with_present_names(text: &str) -> Cow<'_, str> {
     )
 }
 
+/// The command whose options have no name of a command before them.
+pub(crate) const DEFAULT_COMMAND: &str = "eval";
+
+/// The command with these options, as a manifest has them.
+pub(crate) fn command_of(text: &str) -> &str {
+    let first = text.split(' ').next().unwrap_or_default();
+    match first.is_empty() || first.contains('=') {
+        true => DEFAULT_COMMAND,
+        false => first,
+    }
+}
+
+/// Which options differ between the texts of two requests, such as `option --fps`.
+pub(crate) fn changed_options(recorded: &str, current: &str) -> String {
+    let entries = |text: &str| -> BTreeSet<String> { text.split(' ').map(str::to_owned).collect() };
+    let (recorded, current) = (entries(recorded), entries(current));
+    let changed = recorded.symmetric_difference(&current);
+    let names = changed.filter_map(|entry| entry.split_once('=').map(|(name, _)| name));
+    let names: BTreeSet<String> = names
+        .map(|name| format!("--{}", name.replace('_', "-")))
+        .collect();
+    let names: Vec<String> = names.into_iter().collect();
+    match names.len() {
+        0 => "an option".to_owned(),
+        1 => format!("option {}", names[0]),
+        _ => format!("options {}", names.join(", ")),
+    }
+}
+
 /// The rule of an option.
 pub(crate) fn rule(name: &str) -> Option<&'static OptionRule> {
     OPTIONS.iter().find(|rule| rule.name == name)
@@ -690,6 +719,18 @@ mod tests {
                 !decides || long.replace('-', "_") == name,
                 "{name} is --{long}"
             );
+        }
+    }
+
+    #[test]
+    fn the_options_in_a_manifest_name_their_command() {
+        for (text, command) in [
+            ("features fps=20 sets=contacts", "features"),
+            ("convert ", "convert"),
+            ("layout=track method=slerp", "eval"),
+            ("", "eval"),
+        ] {
+            assert_eq!(command_of(text), command, "{text}");
         }
     }
 

@@ -246,7 +246,7 @@ impl ReadingArguments {
         }
         let robot = Robot::open(file).map_err(|fault| Failure::input(&fault, ""))?;
         let opened = self.opened_robot.get_or_init(|| {
-            words::warnings(&robot.warnings);
+            robot.warnings.iter().cloned().for_each(words::warn_of);
             Arc::new(robot)
         });
         Ok(Some(opened.clone()))

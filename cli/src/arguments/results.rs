@@ -12,7 +12,7 @@ use tumble_formats::sample::Samples;
 use tumble_formats::{Code, Diagnostic, Feature, Format};
 
 use crate::arguments::input::{GatheredInputs, InputReader, Inputs};
-use crate::arguments::options::ResultOptions;
+use crate::arguments::options::{self, ResultOptions};
 use crate::batch::entry::InputEntry;
 use crate::batch::output_plan::{self, OutputOptions, OutputPlan};
 use crate::batch::pipeline::{BatchOptions, ClipWork, Pipeline, PipelineInputs};
@@ -199,6 +199,7 @@ impl ResultArguments {
             resume: self.resume,
             prune: self.prune,
             naming: self.names,
+            command: options::command_of(&work.options.text),
         };
         if self.dry_run {
             return Err(self.list_plan(inputs, options, work)?);
@@ -356,7 +357,7 @@ pub(crate) fn document_to_rewrite<'a>(
     };
     let why = otherwise.or(loaded.adjustment.map(Adjustment::makes_new));
     if let Some(lost) = left_behind(document, &loaded.warnings, format, why) {
-        work.warn(Diagnostic::new(&work.name, Code::NoRoom, lost));
+        words::warn_of(Diagnostic::new(&work.name, Code::NoRoom, lost));
     }
     if !document.writes(format) || why.is_some() {
         return Ok(None);
@@ -399,12 +400,13 @@ pub(crate) fn check_stores_keys(plan: &OutputPlan) -> Result<(), Failure> {
 
 /// Writes the keys of clips: into `document`, where the input's file is written again, else into a new one.
 pub(crate) fn write_keys(
-    name: &str,
+    work: &ClipWork,
     clips: &[Cow<'_, Motion>],
     document: Option<&dyn Document>,
     options: &MotionOptions,
-    target: &ResultTarget,
 ) -> Result<WrittenFile, Failure> {
+    let target = &work.target;
+    let name = &*work.name;
     let keys = clips.iter().map(|clip| {
         let keys = keys_for(clip, target.format(), document.is_some());
         keys.map_err(|error| match error {
@@ -419,7 +421,7 @@ pub(crate) fn write_keys(
         true => clip.rate,
         false => clip.rate.or_else(|| clip.rate_of_keys()),
     };
-    let notes = [("input", name.to_owned())];
+    let notes = [("input", work.origin())];
     let sampled = (clips.iter().zip(&keys)).map(|(clip, (samples, per_channel))| SampledClip {
         is_at_keys: *per_channel,
         ..samples.of(clip, rate(clip), &notes)

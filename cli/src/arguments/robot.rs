@@ -310,7 +310,7 @@ impl DialectArguments {
             LimitRule::Clamp => clamp_scalars(clip, values, rates),
             LimitRule::Report => {}
         }
-        work.warn(Diagnostic::new(&work.name, Code::JointLimits, message));
+        words::warn_of(Diagnostic::new(&work.name, Code::JointLimits, message));
         Ok(())
     }
 
@@ -335,7 +335,7 @@ impl DialectArguments {
             ));
         };
         if let Some(message) = self.limits_text(&bodies.excesses, clip, &bodies.times) {
-            work.warn(Diagnostic::new(name, Code::JointLimits, message));
+            words::warn_of(Diagnostic::new(name, Code::JointLimits, message));
         }
         let order = self.body_order.unwrap_or(dialect.order);
         let joint_order = self.joint_order.unwrap_or(order);

@@ -14,7 +14,7 @@ use tumble_formats::format::Document;
 use tumble_formats::motion::Motion;
 use tumble_formats::outside::Outside;
 use tumble_formats::times::{clock_text, open_times};
-use tumble_formats::{Format, ReadOptions};
+use tumble_formats::{Code, Diagnostic, Format, ReadOptions};
 
 use crate::arguments::interpolation::{kept, of_outside};
 use crate::arguments::output::one_of;
@@ -447,7 +447,7 @@ impl SampleChoice {
         let in_gaps = held.iter().flatten().count();
         let lie = if times.len() == 1 { "lies" } else { "lie" };
         let found = format!(
-            "{name}: {in_gaps} of {} {lie} between keys that are more than {max_gap} s apart",
+            "{in_gaps} of {} {lie} between keys that are more than {max_gap} s apart",
             words::count(times.len(), "time")
         );
         let each = times.iter().zip(&held);
@@ -461,7 +461,7 @@ impl SampleChoice {
             InGaps::Refuse => {
                 let time = clock_text(clip.time_offset, times[first]);
                 let message = format!(
-                    "{found}, the first at {time} s; continue with --in-gaps leave-out or hold"
+                    "{name}: {found}, the first at {time} s; continue with --in-gaps leave-out or hold"
                 );
                 return Err(Failure::new(ALL_INPUTS, message));
             }
@@ -483,7 +483,8 @@ impl SampleChoice {
                 "held at the key before"
             }
         };
-        words::warning(&format!("{found}; they are {done}"));
+        let message = format!("{found}; they are {done}");
+        words::warn_of(Diagnostic::new(name, Code::InGaps, message));
         Ok(samples)
     }
 
@@ -567,10 +568,11 @@ fn warn_outside_keys(start: f64, end: f64, clip: &Motion, outside: Outside, name
     if start < first && is_default_before || end > last && is_default_after {
         let [start, end, first, last] =
             [start, end, first, last].map(|time| clock_text(clip.time_offset, time));
-        words::warning(&format!(
-            "{name}: the times from {start} to {end} s exceed the keys, {first} to {last} s; outside them the first or \
-             the last key is held (--before and --after select other values)"
-        ));
+        let message = format!(
+            "the times from {start} to {end} s exceed the keys, {first} to {last} s; outside them the first or the last \
+             key is held (--before and --after select other values)"
+        );
+        words::warn_of(Diagnostic::new(name, Code::OutsideKeys, message));
     }
 }
 

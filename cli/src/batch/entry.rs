@@ -8,13 +8,13 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, LazyLock};
 
 use serde::{Deserialize, Serialize};
-use tumble_formats::Diagnostic;
 use tumble_formats::beneath::{is_beneath, open_beneath};
 
-use crate::arguments::options::{OptionFile, with_present_names};
+use crate::arguments::options::{self, OptionFile, with_present_names};
 use crate::batch::digest;
 use crate::batch::target::WrittenFile;
 use crate::messages::exit::{Failure, OUTPUT};
+use crate::messages::warnings::RecordedWarning;
 use crate::messages::{names, words};
 
 /// The name of a manifest in its directory.
@@ -73,26 +73,6 @@ impl FrameNotes {
     }
 }
 
-/// A warning in a manifest and in JSON.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub(crate) struct RecordedWarning {
-    pub(crate) code: String,
-    /// Line and column, or the place inside the file.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub(crate) location: Option<String>,
-    pub(crate) message: String,
-}
-
-impl From<&Diagnostic> for RecordedWarning {
-    fn from(warning: &Diagnostic) -> Self {
-        Self {
-            code: warning.code.name().to_owned(),
-            location: warning.location.as_ref().map(ToString::to_string),
-            message: warning.message.clone(),
-        }
-    }
-}
-
 /// An input without a result, or with a part of its results.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct InputEntry {
@@ -114,6 +94,12 @@ pub(crate) struct InputEntry {
     /// Why each of its animations failed, where some did.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub(crate) causes: Vec<String>,
+    /// The warnings about the input and those of its animations that failed.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(crate) warnings: Vec<RecordedWarning>,
+    /// The command that processes it, where that is not `tumble eval`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) command: Option<String>,
 }
 
 /// Why an input has no result.
@@ -139,6 +125,8 @@ impl InputEntry {
             message: None,
             diagnostic: None,
             causes: Vec::new(),
+            warnings: Vec::new(),
+            command: None,
         }
     }
 
@@ -152,6 +140,8 @@ impl InputEntry {
             message: Some(failure.message().to_owned()),
             diagnostic: failure.input_code().map(|code| code.name().to_owned()),
             causes: failure.causes().to_vec(),
+            warnings: Vec::new(),
+            command: None,
         }
     }
 
@@ -165,6 +155,8 @@ impl InputEntry {
             message: Some(why),
             diagnostic: None,
             causes: Vec::new(),
+            warnings: Vec::new(),
+            command: None,
         }
     }
 
@@ -176,6 +168,17 @@ impl InputEntry {
             .as_deref()
             .is_none_or(is_beneath)
             .then_some(entry)
+    }
+
+    /// As [`InputEntry::command`], of a request with these options.
+    pub(crate) fn command_in(options: &str) -> Option<String> {
+        let command = options::command_of(options);
+        (command != options::DEFAULT_COMMAND).then(|| command.to_owned())
+    }
+
+    /// The command that processes it.
+    pub(crate) fn command(&self) -> &str {
+        self.command.as_deref().unwrap_or(options::DEFAULT_COMMAND)
     }
 
     /// The key that entries of one input share: its result, or else its name behind a character that no result
@@ -223,6 +226,11 @@ impl ManifestEntry {
             inputs.remove(self.whole().0);
             inputs.remove(&InputEntry::key_by_input(&self.input));
         }
+    }
+
+    /// The command that made it.
+    pub(crate) fn command(&self) -> &str {
+        options::command_of(&self.options)
     }
 
     /// Whether it is the result of the same request.

@@ -26,7 +26,8 @@ use crate::batch::entry::{
     BatchStart, InputEntries, InputEntry, InputState, ManifestEntry, ManifestLines, NAME,
     PreviousEntries, ResultRecorder, line, of_clips,
 };
-use crate::batch::owner::Owner;
+use crate::batch::owner::{CommandsOfResults, Owner};
+use crate::batch::result_names::ResultName;
 use crate::batch::shards::{plan::RecordedPlan, record};
 use crate::batch::target::{self, WrittenFile};
 use crate::messages::exit::{Failure, OUTPUT};
@@ -210,6 +211,16 @@ impl Manifest {
                 .next()
         };
         whole.or_else(clip).map(Owner::from)
+    }
+
+    /// Refuses to resume results of other commands; see [`CommandsOfResults`].
+    pub(crate) fn check_command(
+        &self,
+        results: &[ResultName],
+        command: &str,
+    ) -> Result<(), Failure> {
+        let commands = CommandsOfResults::of(&self.previous, &self.inputs);
+        commands.check(&self.folder, results, command)
     }
 
     /// Adds the line of a result, in one piece.
@@ -420,28 +431,32 @@ pub(crate) enum InputPresence {
 impl InputPresence {
     /// Whether the input of a result is present.
     pub(crate) fn of_entry(entry: &ManifestEntry) -> Self {
-        Self::of(&entry.input, Some(entry.whole().0))
+        Self::of(&entry.input, Some(entry.whole().0), entry.is_of_directory())
     }
 
     /// Whether an input without a result is present.
     fn of_input(entry: &InputEntry) -> Self {
-        Self::of(&entry.input, entry.result.as_deref())
+        // Directories that could not be read have no result.
+        Self::of(
+            &entry.input,
+            entry.result.as_deref(),
+            entry.result.is_none(),
+        )
     }
 
     /// Whether the input with this path, whose result has this name, is present. It is gone if the directory that the
     /// command line named is there and has other files: the input's path without the part that the name of its result
     /// repeats. For a path below the current directory, such as `walks/a.bvh` in a list of inputs, that is the first
-    /// folder. For a name alone it is unknown, because every directory may be the one that it was in.
-    fn of(input: &str, result: Option<&str>) -> Self {
+    /// folder. For a name alone it is unknown, because every directory may be the one that it was in. A directory in the
+    /// place of a file, unless `may_be_folder` is set, is not the input.
+    fn of(input: &str, result: Option<&str>, may_be_folder: bool) -> Self {
         let path = Path::new(input);
-        let is_missing = || {
-            let found = std::fs::symlink_metadata(path);
-            found.is_err_and(|error| {
-                matches!(
-                    error.kind(),
-                    io::ErrorKind::NotFound | io::ErrorKind::NotADirectory
-                )
-            })
+        let is_missing = || match std::fs::symlink_metadata(path) {
+            Ok(found) => found.is_dir() && !may_be_folder,
+            Err(error) => matches!(
+                error.kind(),
+                io::ErrorKind::NotFound | io::ErrorKind::NotADirectory
+            ),
         };
         if names::is_standard(path) {
             return Self::Present;
@@ -531,7 +546,10 @@ impl ResultRecorder for Manifest {
         let mut has_pending = false;
         for (input, result) in start.inputs {
             if !(start.resume && is_same(result)) || self.unfinished.contains(result) {
-                let entry = InputEntry::pending(input, result);
+                let entry = InputEntry {
+                    command: InputEntry::command_in(start.options),
+                    ..InputEntry::pending(input, result)
+                };
                 self.inputs.insert(entry.key(), entry);
                 has_pending = true;
             }

@@ -50,6 +50,8 @@ pub(crate) struct OutputOptions<'a> {
     pub(crate) resume: bool,
     pub(crate) prune: bool,
     pub(crate) naming: ResultNaming,
+    /// The command that makes the results.
+    pub(crate) command: &'a str,
 }
 
 /// Whether a single input's result is one file, and not a file in a directory.
@@ -147,6 +149,9 @@ fn in_folder(
             prune: options.prune,
         },
     )?;
+    if options.resume && !options.overwrite {
+        manifest.check_command(&names, options.command)?;
+    }
     // Results of unfinished shards have no line yet.
     let is_known = |name: &str| shards.is_some() || manifest.knows(name);
     let overwrites = |name: &str| options.overwrite || options.resume && is_known(name);

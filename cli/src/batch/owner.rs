@@ -1,10 +1,12 @@
 //! Which input a result is of. A batch that is resumed makes results again if their inputs have changed, but does not
 //! replace the result of another input that still exists.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use crate::batch::digest::InputFile;
-use crate::batch::entry::ManifestEntry;
+use crate::batch::entry::{InputEntries, InputEntry, InputState, ManifestEntry};
+use crate::batch::result_names::ResultName;
 use crate::messages::exit::Failure;
 use crate::messages::{names, words};
 
@@ -39,6 +41,61 @@ impl Owner {
         }
         let file = InputFile::new(path);
         self.sha256.is_some() && file.sha256() == self.sha256.as_deref()
+    }
+}
+
+/// The commands that made the results of a directory.
+pub(crate) struct CommandsOfResults<'a> {
+    /// Those of each result of all clips of an input.
+    of_results: BTreeMap<&'a str, &'a str>,
+    /// Those of the inputs that have no result.
+    others: BTreeSet<&'a str>,
+}
+
+impl<'a> CommandsOfResults<'a> {
+    /// Of the lines of a manifest.
+    pub(crate) fn of(
+        entries: &'a BTreeMap<String, ManifestEntry>,
+        inputs: &'a InputEntries,
+    ) -> Self {
+        let of_results = entries.values();
+        let processed = inputs
+            .values()
+            .filter(|entry| entry.state != InputState::Skipped);
+        Self {
+            of_results: of_results
+                .map(|entry| (entry.whole().0, entry.command()))
+                .collect(),
+            others: processed.map(InputEntry::command).collect(),
+        }
+    }
+
+    /// Refuses to resume results that another command made, or a directory of which this command made nothing.
+    pub(crate) fn check(
+        &self,
+        folder: &Path,
+        results: &[ResultName],
+        command: &str,
+    ) -> Result<(), Failure> {
+        let of_result = |name: &String| {
+            let other = *self.of_results.get(&**name)?;
+            (other != command).then(|| (folder.join(name), other))
+        };
+        let all = || self.of_results.values().chain(&self.others).copied();
+        let of_folder = || {
+            let other = all().next().filter(|_| all().all(|it| it != command))?;
+            Some((folder.to_owned(), other))
+        };
+        let found = results.iter().flatten().find_map(of_result);
+        let Some((path, other)) = found.or_else(of_folder) else {
+            return Ok(());
+        };
+        let path = path.display();
+        Err(Failure::usage(format!(
+            "{path}: was made by `tumble {other}`, and `tumble {command} --resume` continues what `tumble {command}` \
+             made; resume with `tumble {other}`, give another directory, or --overwrite to replace results of the same \
+             names"
+        )))
     }
 }
 

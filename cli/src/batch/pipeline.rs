@@ -11,9 +11,8 @@
 //! A thread reads, and hashes, the next input of a batch while the command works on one: at most one waits,
 //! so that at most two are in memory. A failure of an input is reported when the next one begins, and the
 //! others go on, unless they would fail alike. Warnings of a batch are summed up at its end ([`BatchSummary`]);
-//! those of a single input are printed as they come.
+//! those of a single input are printed as they come. Both are in the JSON, and in the manifest of the batch.
 
-use std::cell::RefCell;
 use std::collections::{BTreeMap, HashSet, VecDeque};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -27,12 +26,12 @@ use serde_json::{Value, json};
 use tumble_formats::motion::Motion;
 use tumble_formats::{Diagnostic, Feature, Limits, Loaded};
 
-use crate::arguments::input::{InputReader, check_complete, print_warnings, several_clips_failure};
+use crate::arguments::input::{InputReader, check_complete, several_clips_failure};
 use crate::arguments::options::ResultOptions;
 use crate::batch::digest::InputFile;
 use crate::batch::entry::{
-    BatchStart, FrameNotes, InputEntry, ManifestEntry, PreviousEntries, RecordedWarning,
-    ResultRecorder, kernels_sha256,
+    BatchStart, FrameNotes, InputEntry, ManifestEntry, PreviousEntries, ResultRecorder,
+    kernels_sha256,
 };
 use crate::batch::output_plan::UnplannedInput;
 use crate::batch::owner::{Owner, ReplacedOwners};
@@ -41,6 +40,7 @@ use crate::batch::target::{ResultTarget, WrittenFile};
 use crate::messages::exit::{DEVICE, Failure, Outcomes, SOME_INPUTS};
 use crate::messages::progress::{Progress, busy};
 use crate::messages::signals::BatchGuard;
+use crate::messages::warnings::{self, RecordedWarning, Warning, WarningMark};
 use crate::messages::{listing, names, signals, words};
 
 /// An input and the target of its result.
@@ -93,20 +93,11 @@ pub(crate) struct ClipWork {
     pub(crate) name: String,
     pub(crate) target: ResultTarget,
     clips: std::ops::Range<usize>,
-    warnings: RefCell<Vec<Diagnostic>>,
-    /// Whether warnings are printed as they come, and not at the end of the batch.
-    prints: bool,
+    /// When the work began.
+    mark: WarningMark,
 }
 
 impl ClipWork {
-    /// Adds a warning about the clips, or about their results.
-    pub(crate) fn warn(&self, warning: Diagnostic) {
-        if self.prints {
-            words::note(&warning.to_string());
-        }
-        self.warnings.borrow_mut().push(warning);
-    }
-
     /// ` (1.2 MB → 860.0 kB)`: the bytes of the input with its files, and of the result; nothing where the input's are
     /// not known.
     pub(crate) fn sizes(&self, written: &WrittenFile) -> String {
@@ -128,6 +119,14 @@ impl ClipWork {
             [clip] if self.input.loaded.clips.len() > 1 => Some(names::clip(clip)),
             _ => None,
         }
+    }
+
+    /// The name of the clips in results: with the name of the input's file alone, so that a file has the same results
+    /// wherever it is.
+    pub(crate) fn origin(&self) -> String {
+        let input = names::input(self.path());
+        let animation = self.name.strip_prefix(&*input).unwrap_or_default();
+        format!("{}{animation}", names::file(self.path()))
     }
 
     /// The path of the input.
@@ -203,7 +202,9 @@ struct CurrentInput {
     file_count: usize,
     failed: Vec<Failure>,
     /// The warnings so far: those of the input, and those about its clips.
-    warnings: Vec<Diagnostic>,
+    warnings: Vec<Warning>,
+    /// Those about clips that failed.
+    of_failed: Vec<RecordedWarning>,
 }
 
 /// The results of a batch.
@@ -344,7 +345,7 @@ impl<'a> Pipeline<'a> {
     fn refuse_all(&mut self, refused: Vec<UnplannedInput>) {
         for UnplannedInput { path, failure } in refused {
             if !self.outcomes.is_ended() {
-                self.add(&path, None, Err(failure));
+                self.add(&path, None, Err(failure), Vec::new());
             }
         }
     }
@@ -355,13 +356,13 @@ impl<'a> Pipeline<'a> {
             while let Some(current) = &mut self.current {
                 match current.files.pop_front() {
                     Some(Ok(file)) => {
+                        warnings::sum(self.batch.is_some());
                         return Some(ClipWork {
                             input: Rc::clone(&current.input),
                             name: file.name,
                             target: file.target,
                             clips: file.clips,
-                            warnings: RefCell::default(),
-                            prints: self.batch.is_none(),
+                            mark: warnings::mark(),
                         });
                     }
                     Some(Err(failure)) => self.fail(failure),
@@ -387,18 +388,18 @@ impl<'a> Pipeline<'a> {
         work: &ClipWork,
         made: Result<(EvaluatedResult, T), Failure>,
     ) -> bool {
-        let mut warnings = work.warnings.borrow_mut();
         let kept = made.and_then(|(mut result, report)| {
-            let mut of_file = std::mem::take(&mut result.written.warnings);
+            let of_file = std::mem::take(&mut result.written.warnings);
             let (target, loaded) = (&work.target, &work.input.loaded);
-            of_file.extend(loaded.space_warning(target.format(), &target.to_string()));
-            if self.batch.is_none() {
-                words::warnings(&of_file);
-            }
-            warnings.extend(of_file);
-            let input = &work.input.loaded.warnings;
-            let recorded = input.iter().chain(&*warnings).map(RecordedWarning::from);
+            let space = loaded.space_warning(target.format(), &target.to_string());
+            of_file.into_iter().chain(space).for_each(words::warn_of);
+            let warnings = warnings::since(work.mark);
+            let of_input = loaded.warnings.iter().map(RecordedWarning::from);
+            let recorded = of_input.chain(warnings.iter().map(RecordedWarning::from));
             let recorded: Vec<RecordedWarning> = recorded.collect();
+            if let Some(current) = &mut self.current {
+                current.warnings.extend(warnings);
+            }
             let sizes = [work.input.file.bytes(), Some(result.written.bytes)];
             match &mut self.batch {
                 Some(batch) => {
@@ -415,9 +416,13 @@ impl<'a> Pipeline<'a> {
             }
             Ok(())
         });
+        let of_failed = warnings::since(work.mark);
         if let Some(current) = &mut self.current {
-            current.warnings.append(&mut warnings);
+            let recorded = of_failed.iter().map(RecordedWarning::from);
+            current.of_failed.extend(recorded);
+            current.warnings.extend(of_failed);
         }
+        warnings::sum(false);
         kept.map_err(|failure| self.fail(failure)).is_ok()
     }
 
@@ -425,7 +430,7 @@ impl<'a> Pipeline<'a> {
     pub(crate) fn finish(self) -> Result<(), Failure> {
         let (outcome, json) = self.finish_with_json();
         if let Some(json) = json {
-            listing::json(&json)?;
+            listing::records(&json, &[])?;
         }
         outcome
     }
@@ -463,24 +468,30 @@ impl<'a> Pipeline<'a> {
             self.skip(&path, &target);
             return;
         };
+        let mut of_failed = Vec::new();
         let files = loaded.and_then(|loaded| {
             match &mut self.batch {
-                None => print_warnings(&loaded),
+                None => words::print_kept(loaded.warnings.iter().chain(&loaded.refused)),
                 Some(batch) => {
                     let parts = loaded.refused.iter();
                     parts.for_each(|fault| batch.summary.fail(&Failure::input(fault, "")));
                 }
             }
-            let files = clip_files(&path, &loaded, &target).inspect_err(|_| {
-                if let Some(batch) = &mut self.batch {
-                    batch.summary.warn(&loaded.warnings);
+            let warnings: Vec<Warning> =
+                (loaded.warnings.iter().cloned().map(Warning::OfInput)).collect();
+            match clip_files(&path, &loaded, &target) {
+                Ok(files) => Ok((loaded, files, warnings)),
+                Err(failure) => {
+                    if let Some(batch) = &mut self.batch {
+                        batch.summary.warn(&warnings);
+                    }
+                    of_failed.extend(warnings.iter().map(RecordedWarning::from));
+                    Err(failure)
                 }
-            })?;
-            Ok((loaded, files))
+            }
         });
         match files {
-            Ok((loaded, files)) => {
-                let warnings = loaded.warnings.clone();
+            Ok((loaded, files, warnings)) => {
                 let input = OpenInput {
                     file,
                     loaded,
@@ -493,9 +504,10 @@ impl<'a> Pipeline<'a> {
                     files,
                     failed: Vec::new(),
                     warnings,
+                    of_failed,
                 });
             }
-            Err(failure) => self.add(&path, Some(target.name()), Err(failure)),
+            Err(failure) => self.add(&path, Some(target.name()), Err(failure), of_failed),
         }
     }
 
@@ -529,8 +541,9 @@ impl<'a> Pipeline<'a> {
         };
         if failure.is_final() {
             let path = current.input.file.path().to_owned();
+            let of_failed = std::mem::take(&mut current.of_failed);
             self.current = None;
-            self.add(&path, None, Err(failure));
+            self.add(&path, None, Err(failure), of_failed);
         } else {
             current.failed.push(failure);
         }
@@ -581,17 +594,34 @@ impl<'a> Pipeline<'a> {
                 batch.records.end_input(current.target.name());
             }
         }
-        self.add(path, Some(current.target.name()), outcome);
+        let mut warnings = current.of_failed;
+        if failed == current.file_count {
+            let of_input = current.input.loaded.warnings.iter();
+            warnings.splice(..0, of_input.map(RecordedWarning::from));
+        }
+        self.add(path, Some(current.target.name()), outcome, warnings);
     }
 
-    /// Adds the outcome of an input; `result` is the name of its result.
-    fn add(&mut self, path: &Path, result: Option<&str>, outcome: Result<(), Failure>) {
+    /// Adds the outcome of an input; `result` is the name of its result, `warnings` are those that no result has.
+    fn add(
+        &mut self,
+        path: &Path,
+        result: Option<&str>,
+        outcome: Result<(), Failure>,
+        warnings: Vec<RecordedWarning>,
+    ) {
         let entry = outcome.as_ref().err().map(|failure| {
             let result = result.filter(|result| !result.is_empty());
-            match failure.message().is_empty() {
+            let entry = match failure.message().is_empty() {
                 // A signal stopped the work: the input has not failed.
                 true => InputEntry::pending(path, result.unwrap_or_default()),
                 false => InputEntry::failed(path, result, failure),
+            };
+            let options = self.batch.as_ref().map_or("", |batch| &batch.options.text);
+            InputEntry {
+                warnings,
+                command: InputEntry::command_in(options),
+                ..entry
             }
         });
         if let (Some(entry), Some(json)) = (&entry, &mut self.json) {
@@ -852,7 +882,7 @@ impl<R: InputReader> ReadingAhead<R> {
 }
 
 /// The hash of an input's bytes, which are read next; longer inputs are refused.
-pub(super) fn hash_before_reading(file: &InputFile, limits: Limits) -> Option<&str> {
+pub(crate) fn hash_before_reading(file: &InputFile, limits: Limits) -> Option<&str> {
     let is_read = std::fs::metadata(file.path()).is_ok_and(|found| found.len() <= limits.file);
     is_read.then(|| file.sha256()).flatten()
 }

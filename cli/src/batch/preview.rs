@@ -14,7 +14,7 @@ use tumble_formats::printable::printable;
 use tumble_formats::{Feature, Loaded};
 
 use crate::arguments::input::{FoundInput, GatheredInputs, InputReader, several_clips_failure};
-use crate::arguments::options::ResultOptions;
+use crate::arguments::options::{ResultOptions, changed_options};
 use crate::batch::digest::{self, InputFile};
 use crate::batch::entry::{ManifestEntry, ManifestLines, PreviousEntries};
 use crate::batch::manifest::PlannedResults;
@@ -22,7 +22,7 @@ use crate::batch::output_plan::{
     OutputOptions, UnplannedInput, goes_to_file, refuse_existing, refuse_lost_plan, refuse_shards,
     without_results,
 };
-use crate::batch::owner::{Owner, ReplacedOwners};
+use crate::batch::owner::{CommandsOfResults, Owner, ReplacedOwners};
 use crate::batch::pipeline::{SEVERAL_CLIPS_REMEDY, clip_file_names, hash_before_reading};
 use crate::batch::result_names::{format, name_results};
 use crate::batch::shards::plan::RecordedPlan;
@@ -190,23 +190,6 @@ fn of_one_file(
 
 const REPLACED: &str = "replaces a file";
 
-/// Which options differ between the texts of two requests, such as `option --fps`.
-fn changed_options(recorded: &str, current: &str) -> String {
-    let entries = |text: &str| -> BTreeSet<String> { text.split(' ').map(str::to_owned).collect() };
-    let (recorded, current) = (entries(recorded), entries(current));
-    let changed = recorded.symmetric_difference(&current);
-    let names = changed.filter_map(|entry| entry.split_once('=').map(|(name, _)| name));
-    let names: BTreeSet<String> = names
-        .map(|name| format!("--{}", name.replace('_', "-")))
-        .collect();
-    let names: Vec<String> = names.into_iter().collect();
-    match names.len() {
-        0 => "an option".to_owned(),
-        1 => format!("option {}", names[0]),
-        _ => format!("options {}", names.join(", ")),
-    }
-}
-
 /// For each result of inputs that failed in the last run, at least in part: why it is made again.
 fn failed_before(lines: &ManifestLines) -> BTreeMap<String, String> {
     let failed = lines.unfinished_inputs().failed.into_iter();
@@ -271,6 +254,11 @@ impl<'a> PreviewedFolder<'a> {
         let (mut lines, _) = ManifestLines::of_folder(out, options.overwrite)?;
         if shards.is_some() {
             lines.extend(record::lines(out));
+        }
+        if options.resume && !options.overwrite {
+            let result_names = name_results(files, out, format, options.naming);
+            let commands = CommandsOfResults::of(&lines.entries, &lines.inputs);
+            commands.check(out, &result_names, options.command)?;
         }
         let (unfinished, failed) = (lines.unfinished(), failed_before(&lines));
         Ok(Self {

@@ -9,6 +9,7 @@ use tumble_formats::printable::printable_path;
 use tumble_formats::{Code, Diagnostic};
 
 use crate::messages::exit::Failure;
+use crate::messages::warnings::Warning;
 use crate::messages::words;
 
 /// The most inputs of a batch that prints a line for each result.
@@ -92,10 +93,15 @@ impl BatchSummary {
         }
     }
 
-    /// The warnings of one input: each is printed, or counted for the end.
-    pub(crate) fn warn(&mut self, warnings: &[Diagnostic]) {
+    /// The warnings of one input: each is printed, or counted for the end. Those that are not about the input have been
+    /// printed.
+    pub(crate) fn warn(&mut self, warnings: &[Warning]) {
+        let warnings = warnings.iter().filter_map(|warning| match warning {
+            Warning::OfInput(diagnostic) => Some(diagnostic),
+            Warning::Other(_) => None,
+        });
         if self.prints_warnings {
-            words::warnings(warnings);
+            words::print_kept(warnings);
             return;
         }
         let mut codes = BTreeSet::new();
@@ -196,9 +202,9 @@ impl BatchSummary {
 mod tests {
     use super::*;
 
-    fn warnings(file: &str, count: usize) -> Vec<Diagnostic> {
+    fn warnings(file: &str, count: usize) -> Vec<Warning> {
         let one = |index: usize| Diagnostic::new(file, Code::NoRoom, format!("fault {index}"));
-        (1..=count).map(one).collect()
+        (1..=count).map(one).map(Warning::OfInput).collect()
     }
 
     /// The first of several warnings of one input says how many there are more.

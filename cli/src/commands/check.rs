@@ -11,7 +11,9 @@ use serde::Serialize;
 
 use crate::arguments::options::{self, OptionFile};
 use crate::batch::digest::{self, InputFile};
-use crate::batch::entry::{self, InputEntry, ManifestEntry, ManifestLines, NAME, UnfinishedInputs};
+use crate::batch::entry::{
+    self, InputEntry, InputState, ManifestEntry, ManifestLines, NAME, UnfinishedInputs,
+};
 use crate::batch::manifest::InputPresence;
 use crate::batch::shards::merge::ShardProgress;
 use crate::batch::shards::plan::RecordedPlan;
@@ -196,73 +198,54 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         })?;
     }
     let total = words::count(entries.len(), "result");
-    let mut missing: Vec<String> = Vec::new();
     let count_of = |is_kind: fn(&Fault) -> bool| {
         let faults = faults.iter().filter(|(_, fault)| is_kind(fault));
         faults.count()
     };
     let unreadable = count_of(|fault| matches!(fault, Fault::Unreadable(_)));
     let of_removed_clips = count_of(|fault| matches!(fault, Fault::RemovedClip(_)));
-    for (count, verb) in [
-        (faults.len() - unreadable - of_removed_clips, "changed"),
-        (unreadable, "missing or unreadable"),
-        (of_removed_clips, "of clips that are gone"),
-    ] {
-        if count > 0 {
-            missing.push(format!("{count} of {total} {verb}"));
-        }
-    }
-    if lines.damaged > 0 {
+    let of_total =
+        |count: usize, verb: &str| (count > 0).then(|| format!("{count} of {total} {verb}"));
+    // A manifest is recognised by its first line.
+    let is_known = shards.is_some() || entry::open(folder).is_ok();
+    let remedies = Remedies::new(&lines, &faults, is_known);
+    let (failed, pending) = unfinished(&lines);
+    let changed = faults.len() - unreadable - of_removed_clips;
+    let made_again = [
+        of_total(changed, "changed"),
+        of_total(unreadable, "missing or unreadable"),
+        pending,
+    ];
+    let clips = of_total(of_removed_clips, "of clips that are gone");
+    let damaged = (lines.damaged > 0).then(|| {
         let damaged = words::count(lines.damaged, "line");
-        missing.push(format!("{damaged} of the manifest damaged"));
-    }
-    let is_made_again =
-        faults.len() > of_removed_clips || !lines.unfinished_inputs().pending.is_empty();
-    let has_failed = !lines.unfinished_inputs().failed.is_empty();
-    missing.extend(unfinished(&lines));
-    missing.extend(absent.texts());
-    if !missing.is_empty()
-        && let Some(progress) = &progress
-    {
-        missing.push(unmerged(folder, progress));
-    }
-    if !missing.is_empty() {
-        let missing = missing.join(", ");
-        // A manifest is recognised by its first line.
-        let is_known = shards.is_some() || entry::open(folder).is_ok();
-        let pruned = match (of_removed_clips > 0, !absent.orphans.is_empty()) {
-            (false, false) => None,
-            (true, false) => Some("those of clips that are gone"),
-            (false, true) => Some("those without inputs"),
-            (true, true) => Some("those without inputs and of clips that are gone"),
-        };
-        let remedy = match (is_known, pruned) {
-            (true, _) if lines.damaged > 0 => {
-                "`--resume` does not recognise a result whose line is damaged: `tumble eval … --overwrite` \
-                 makes all results again"
-                    .to_owned()
-            }
-            (true, Some(pruned)) if is_made_again => {
-                format!("`tumble eval … --resume --prune` makes them again, and removes {pruned}")
-            }
-            (true, None) if is_made_again => "`tumble eval … --resume` makes them again".to_owned(),
-            (true, Some(pruned)) => format!("`tumble eval … --resume --prune` removes {pruned}"),
-            (true, None) if has_failed => "`tumble eval … --resume` tries them again".to_owned(),
-            (true, None) => String::new(),
-            (false, _) => {
-                "the first line of the manifest is damaged: `tumble eval … --overwrite` makes all results again"
-                    .to_owned()
-            }
-        };
-        let elsewhere = match absent.elsewhere.is_empty() {
-            true => "",
-            false => {
+        format!("{damaged} of the manifest damaged")
+    });
+    let parts = [
+        (joined(made_again), remedies.resume("", ["makes", "make"], "again")),
+        (failed, remedies.resume("", ["tries", "try"], "again")),
+        (
+            joined([clips, absent.orphans_text()]),
+            remedies.resume(" --prune", ["removes", "remove"], ""),
+        ),
+        (damaged, remedies.overwrite()),
+        (
+            absent.elsewhere_text(),
+            Some(
                 "run it in the directory in which the batch ran, or add --results-only to check the results alone"
-            }
-        };
-        let parts = [&*missing, &*remedy, elsewhere];
-        let parts: Vec<&str> = parts.into_iter().filter(|part| !part.is_empty()).collect();
-        return Err(Failure::new(DIFFERENCE, parts.join("; ")));
+                    .to_owned(),
+            ),
+        ),
+    ];
+    let parts = parts.into_iter().filter_map(|(fact, remedy)| {
+        let fact = fact?;
+        Some(remedy.map_or_else(|| fact.clone(), |remedy| format!("{fact}; {remedy}")))
+    });
+    let mut missing: Vec<String> = parts.collect();
+    if !missing.is_empty() {
+        missing.extend(progress.iter().map(|progress| unmerged(folder, progress)));
+        let first = missing.remove(0);
+        return Err(Failure::new(DIFFERENCE, first).with_lines(missing));
     }
     let were = if entries.len() == 1 {
         "it was"
@@ -280,24 +263,86 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
 }
 
-/// The inputs without all their results: how many, and the first.
-fn unfinished(lines: &ManifestLines) -> Vec<String> {
+/// Facts in a line; `None` where there are none.
+fn joined(facts: impl IntoIterator<Item = Option<String>>) -> Option<String> {
+    let facts: Vec<String> = facts.into_iter().flatten().collect();
+    (!facts.is_empty()).then(|| facts.join(", "))
+}
+
+/// The commands that mend a directory of results.
+struct Remedies {
+    /// The commands of the results and inputs that are to be made again, or those of all.
+    commands: BTreeSet<String>,
+    has_damaged_lines: bool,
+    /// Whether the program would recognise the manifest.
+    is_known: bool,
+}
+
+impl Remedies {
+    fn new(lines: &ManifestLines, faults: &[(&ManifestEntry, Fault)], is_known: bool) -> Self {
+        let faulty = faults.iter().map(|(entry, _)| entry.command());
+        let processed = lines.inputs.values();
+        let processed = processed.filter(|entry| entry.state != InputState::Skipped);
+        let mut commands: BTreeSet<&str> =
+            faulty.chain(processed.map(InputEntry::command)).collect();
+        if commands.is_empty() {
+            commands.extend(lines.entries.values().map(ManifestEntry::command));
+        }
+        if commands.is_empty() {
+            commands.insert(options::DEFAULT_COMMAND);
+        }
+        Self {
+            commands: commands.into_iter().map(str::to_owned).collect(),
+            has_damaged_lines: lines.damaged > 0,
+            is_known,
+        }
+    }
+
+    /// `tumble features … --resume makes them again`; `None` where that would not help. The verb is that of one command,
+    /// and of several.
+    fn resume(&self, more: &str, verbs: [&str; 2], again: &str) -> Option<String> {
+        let helps = self.is_known && !self.has_damaged_lines;
+        let lines = self.lines(&format!("--resume{more}"));
+        let verb = verbs[usize::from(self.commands.len() > 1)];
+        helps.then(|| format!("{lines} {verb} them {again}").trim_end().to_owned())
+    }
+
+    fn overwrite(&self) -> Option<String> {
+        let why = match self.is_known {
+            true => "`--resume` does not recognise a result whose line is damaged",
+            false => "the first line of the manifest is damaged",
+        };
+        let lines = self.lines("--overwrite");
+        let make = if self.commands.len() == 1 {
+            "makes"
+        } else {
+            "make"
+        };
+        Some(format!("{why}: {lines} {make} all results again"))
+    }
+
+    fn lines(&self, options: &str) -> String {
+        let lines = self.commands.iter();
+        let lines = lines.map(|command| format!("`tumble {command} … {options}`"));
+        lines.collect::<Vec<_>>().join(" and ")
+    }
+}
+
+/// The inputs that failed and those that no batch has processed yet: how many, and the first.
+fn unfinished(lines: &ManifestLines) -> (Option<String>, Option<String>) {
     let UnfinishedInputs { failed, pending } = lines.unfinished_inputs();
-    let mut texts = Vec::new();
-    if let Some(first) = failed.first() {
+    let failed = failed.first().map(|first| {
         let count = FailedInputs::of_codes(failed.iter().map(|entry| entry.code));
         let message = first.message.as_deref().unwrap_or_default();
         let count = count.text().unwrap_or_default();
-        texts.push(format!("{count} (the first: {message})"));
-    }
-    if let Some(first) = pending.first() {
+        format!("{count} (the first: {message})")
+    });
+    let pending = pending.first().map(|first| {
         let inputs = words::count(pending.len(), "input");
         let have = if pending.len() == 1 { "has" } else { "have" };
-        texts.push(format!(
-            "{inputs} {have} no result yet (the first: {first})"
-        ));
-    }
-    texts
+        format!("{inputs} {have} no result yet (the first: {first})")
+    });
+    (failed, pending)
 }
 
 /// How many shards of a directory are done, and the command that finishes or combines them.
@@ -348,27 +393,25 @@ impl<'a> AbsentFiles<'a> {
         removed.chain(self.elsewhere.iter().copied()).collect()
     }
 
-    fn texts(&self) -> Vec<String> {
-        let mut texts = Vec::new();
-        if let Some(first) = self.orphans.first() {
-            let results = words::count(self.orphans.len(), "result");
-            let have = if self.orphans.len() == 1 {
-                "has"
-            } else {
-                "have"
-            };
-            let first = &first.output;
-            texts.push(format!(
-                "{results} {have} no input any more (the first: {first})"
-            ));
-        }
-        if let Some(first) = self.elsewhere.first() {
-            let files = words::count(self.elsewhere.len(), "input file");
-            texts.push(format!(
-                "{files} not found (the first: {first}), so changes in them are not known"
-            ));
-        }
-        texts
+    fn orphans_text(&self) -> Option<String> {
+        let first = &self.orphans.first()?.output;
+        let results = words::count(self.orphans.len(), "result");
+        let have = if self.orphans.len() == 1 {
+            "has"
+        } else {
+            "have"
+        };
+        Some(format!(
+            "{results} {have} no input any more (the first: {first})"
+        ))
+    }
+
+    fn elsewhere_text(&self) -> Option<String> {
+        let first = self.elsewhere.first()?;
+        let files = words::count(self.elsewhere.len(), "input file");
+        Some(format!(
+            "{files} not found (the first: {first}), so changes in them are not known"
+        ))
     }
 }
 

@@ -25,7 +25,7 @@ use crate::arguments::time::{check_range, finite_seconds};
 use crate::batch::pipeline::{ClipWork, EvaluatedResult};
 use crate::batch::preview::PlannedWork;
 use crate::batch::target::ResultTarget;
-use crate::commands::features::{mirror_axis, warn_of_lost_partners};
+use crate::commands::features::{lost_partners, mirror_axis};
 use crate::messages::exit::{ALL_INPUTS, Failure};
 use crate::messages::{names, words};
 
@@ -79,7 +79,6 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     check_range(arguments.start, arguments.end)?;
     let files = arguments.inputs.gather(false)?;
     let asked = arguments.dialect.format(&arguments.results)?;
-    arguments.inputs.reading.robot()?;
     let options = arguments.command_line.options().of_command("convert");
     let reader = arguments.inputs.clone();
     let work = PlannedWork {
@@ -147,19 +146,23 @@ impl Arguments {
             .map_err(failed)
     }
 
-    /// The requested part of a clip, mirrored if that is asked for.
+    /// The requested part of a clip, mirrored if that is asked for, and how many of its joints change their sides.
     fn mirrored_part<'a>(
         &self,
         work: &ClipWork,
         clip: &'a Motion,
-    ) -> Result<Cow<'a, Motion>, Failure> {
+    ) -> Result<(Cow<'a, Motion>, Option<String>), Failure> {
         let name = &*work.name;
         let part = self.part(name, clip)?;
         let Some(axis) = self.mirror else {
-            return Ok(part);
+            return Ok((part, None));
         };
         let robot = self.inputs.reading.robot()?;
         let tree = robot.as_ref().map(|robot| &robot.tree);
+        let of_clip = |warning: Diagnostic| match work.clips().len() {
+            0 | 1 => warning,
+            _ => warning.inside(names::clip(clip)),
+        };
         let (mirrored, report) = mirrored(&part, Mirror { axis, tree }).map_err(|error| {
             let hint = match &error {
                 MirrorError::NoAxis { .. } => " (--robot)",
@@ -177,25 +180,21 @@ impl Arguments {
                 printable(&joint),
                 100.0 * apart
             );
-            work.warn(Diagnostic::new(name, Code::NotSymmetric, message));
+            let warning = Diagnostic::new(name, Code::NotSymmetric, message);
+            words::warn_of(of_clip(warning));
         }
-        let several = work.clips().len() > 1;
-        let name = &*match several {
-            true => format!("{name} {}", names::clip(clip)),
-            false => name.to_owned(),
-        };
         let in_place: Vec<usize> = (0..report.alone.len()).collect();
-        warn_of_lost_partners(name, &report.alone, &in_place);
+        if let Some(warning) = lost_partners(name, &report.alone, &in_place) {
+            words::warn_of(of_clip(warning));
+        }
         let pairs = words::count(report.pairs.len(), "pair");
         let alone = match report.alone.len() {
             0 => "no joint is".to_owned(),
             1 => format!("`{}` is", printable(&report.alone[0])),
             count => format!("{count} joints are"),
         };
-        words::note(&format!(
-            "{name}: {pairs} of joints change their sides; {alone} mirrored in place"
-        ));
-        Ok(Cow::Owned(mirrored))
+        let changed = format!("{pairs} of joints change their sides and {alone} mirrored in place");
+        Ok((Cow::Owned(mirrored), Some(changed)))
     }
 
     fn convert(&self, work: &ClipWork) -> Result<EvaluatedResult, Failure> {
@@ -206,7 +205,9 @@ impl Arguments {
         let loaded = &work.input.loaded;
         let document = document_to_rewrite(work, self.makes_new(target))?;
         let parts = clips.iter().map(|&clip| self.mirrored_part(work, clip));
-        let parts: Vec<Cow<'_, Motion>> = parts.collect::<Result<_, Failure>>()?;
+        let parts: Vec<_> = parts.collect::<Result<_, Failure>>()?;
+        let (parts, changed): (Vec<Cow<'_, Motion>>, Vec<Option<String>>) =
+            parts.into_iter().unzip();
         let is_whole = (self.start, self.end) == (None, None) && self.mirror.is_none();
         let is_copy = document.is_some() && is_whole && !self.inputs.reading.changes_keys();
         let options = MotionOptions {
@@ -227,9 +228,14 @@ impl Arguments {
                 target
                     .write_motion(|out| document.write_joints(&all, &options, target.path(), out))?
             }
-            document => write_keys(name, &parts, document, &options, target)?,
+            document => write_keys(work, &parts, document, &options)?,
         };
-        let done = format!("{}, {}", words::count(parts.len(), "clip"), keys(&parts),);
+        let clips = words::count(parts.len(), "clip");
+        let done = format!(
+            "{clips}, {}{}",
+            keys(&parts),
+            mirrored_text(&parts, &changed)
+        );
         Ok(work.result(written, &done, None))
     }
 
@@ -247,7 +253,8 @@ impl Arguments {
             );
             return Err(Failure::usage(message));
         };
-        let part = self.mirrored_part(work, clip)?;
+        let (part, changed) = self.mirrored_part(work, clip)?;
+        let changed = mirrored_text(std::slice::from_ref(&part), &[changed]);
         let times = part.key_times();
         let rate = part.rate.or_else(|| part.rate_of_keys());
         let spaced = rate.filter(|rate| {
@@ -266,12 +273,12 @@ impl Arguments {
         let found = self
             .dialect
             .evaluate(dialect, &robot, (name, &part), &frames, |run| run(&engine))?;
-        let notes = vec![("input", name.to_owned())];
+        let notes = vec![("input", work.origin())];
         let (written, report) =
             self.dialect
                 .write(dialect, &robot, (work, &part), (&found, frames.rate), notes)?;
         let done = format!(
-            "{}, {}",
+            "{}, {}{changed}",
             words::count(found.times.len(), "frame"),
             report.text()
         );
@@ -293,13 +300,26 @@ fn note_weights(name: &str, clips: &[&Motion]) {
         let in_place: Vec<usize> = (0..weights.len()).collect();
         let of_sides = without_partner(&weights, &in_place);
         if let Some(&first) = of_sides.first() {
-            words::warning(&format!(
-                "{name}: the weights of morph targets are not mirrored: {} with the name of a side (the first: {})",
+            let message = format!(
+                "the weights of morph targets are not mirrored: {} with the name of a side (the first: {})",
                 words::count(of_sides.len(), "target"),
                 printable(weights[first])
-            ));
+            );
+            words::warn_of(Diagnostic::new(name, Code::LostPartner, message));
         }
     }
+}
+
+/// `; 6 pairs of joints change their sides and no joint is mirrored in place`: of each animation by its name, where they
+/// differ.
+fn mirrored_text(parts: &[Cow<'_, Motion>], changed: &[Option<String>]) -> String {
+    let differ = changed.windows(2).any(|pair| pair[0] != pair[1]);
+    let texts = changed.iter().flatten().zip(parts);
+    let texts = texts.map(|(text, part)| match differ {
+        true => format!("; {}: {text}", names::clip(part)),
+        false => format!("; {text}"),
+    });
+    texts.take(if differ { parts.len() } else { 1 }).collect()
 }
 
 /// `30 keys (25 of rotations)`: of all channels of some clips, and those that `tumble info` counts.

@@ -21,6 +21,7 @@ use tumble_formats::robot::{
 };
 use tumble_formats::sample::{ChannelMethods, MethodChoice};
 use tumble_formats::world::world;
+use tumble_formats::{Code, Diagnostic};
 
 use crate::arguments::input::Inputs;
 use crate::arguments::interpolation::method_argument;
@@ -137,7 +138,6 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         );
         return Err(Failure::usage(message));
     }
-    arguments.inputs.reading.robot()?;
     let options = arguments.command_line.options().of_command("features");
     let reader = arguments.inputs.clone();
     let work = PlannedWork {
@@ -161,11 +161,12 @@ fn warn_of_other_rate(name: &str, rate: FrameRate) {
     /// Frames a second of HumanML3D.
     const RATE: u64 = 20;
     if FrameRate::new(RATE, 1).is_ok_and(|of_set| of_set != rate) {
-        words::warning(&format!(
-            "{name}: HumanML3D has {RATE} frames a second, and its numbers are steps from frame to frame; these are of \
-             {} (--fps {RATE})",
+        let message = format!(
+            "HumanML3D has {RATE} frames a second, and its numbers are steps from frame to frame; these are of {} \
+             (--fps {RATE})",
             rate.in_words()
-        ));
+        );
+        words::warn_of(Diagnostic::new(name, Code::SetRate, message));
     }
 }
 
@@ -178,23 +179,24 @@ fn warn_of_other_unit(name: &str, set: &str, poses: &WorldFrames) {
     let high = first.iter().copied().reduce(DVec3::max);
     let size = low.zip(high).map(|(low, high)| (high - low).max_element());
     if let Some(size) = size.filter(|size| !PERSON.contains(size)) {
-        words::warning(&format!(
-            "{name}: {set} is in metres, and the body is {} units tall; is it in another unit? (--scale)",
+        let message = format!(
+            "{set} is in metres, and the body is {} units tall; is it in another unit? (--scale)",
             words::decimals(size)
-        ));
+        );
+        words::warn_of(Diagnostic::new(name, Code::SetUnit, message));
     }
 }
 
 /// Warns of joints that name a side, but are mirrored in place.
-pub(crate) fn warn_of_lost_partners(name: &str, names: &[String], pairs: &[usize]) {
+pub(crate) fn lost_partners(name: &str, names: &[String], pairs: &[usize]) -> Option<Diagnostic> {
     let alone = without_partner(names, pairs);
-    if let Some(&first) = alone.first() {
-        words::warning(&format!(
-            "{name}: mirrored in place: {} with the name of a side and no partner on the other (the first: {})",
-            words::count(alone.len(), "joint"),
-            names[first]
-        ));
-    }
+    let &first = alone.first()?;
+    let message = format!(
+        "mirrored in place: {} with the name of a side and no partner on the other (the first: {})",
+        words::count(alone.len(), "joint"),
+        names[first]
+    );
+    Some(Diagnostic::new(name, Code::LostPartner, message))
 }
 
 /// Refuses skeletons that rest otherwise than SMPL: in a T-pose with y up that faces z, where all joints have the axes of
@@ -313,7 +315,9 @@ impl Arguments {
             }
         }
         if self.sets.contains(&FeatureSet::Mirror) {
-            warn_of_lost_partners(name, &poses.names, &mirror_pairs(&poses.names));
+            if let Some(warning) = lost_partners(name, &poses.names, &mirror_pairs(&poses.names)) {
+                words::warn_of(warning);
+            }
         }
         let failed =
             |error: &dyn std::fmt::Display| Failure::new(ALL_INPUTS, format!("{name}: {error}"));

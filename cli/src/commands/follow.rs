@@ -12,6 +12,7 @@ use tumble_formats::outside::Outside;
 use tumble_formats::path::PathFormat;
 use tumble_formats::poses::{Poses, WORLD};
 use tumble_formats::sample::Samples;
+use tumble_formats::{Code, Diagnostic};
 
 use crate::arguments::device::{DeviceArguments, OpenedDevice};
 use crate::arguments::input::{GatheredInputs, InputSelection};
@@ -22,7 +23,7 @@ use crate::arguments::time::{SampleChoice, SamplingArguments};
 use crate::batch::pipeline::{ClipWork, EvaluatedResult};
 use crate::batch::preview::PlannedWork;
 use crate::batch::room;
-use crate::batch::target::{ResultTarget, WrittenFile};
+use crate::batch::target::WrittenFile;
 use crate::messages::exit::{ALL_INPUTS, Failure};
 use crate::messages::words;
 
@@ -139,10 +140,8 @@ impl Arguments {
         samples: &SampleChoice,
         device: &mut OpenedDevice,
     ) -> Result<EvaluatedResult, Failure> {
-        let [paths] = work.clips()[..] else {
-            unreachable!("all paths of a file are one clip");
-        };
-        let (name, set, target) = (&*work.name, &paths.set, &work.target);
+        let paths = only_clip(work);
+        let (name, set) = (&*work.name, &paths.set);
         let [frame] = self.path.frames()[..] else {
             return Err(Failure::usage("give a single --path-frame"));
         };
@@ -150,7 +149,7 @@ impl Arguments {
         let follow = self.path.follow(paths, name, frame)?;
         let frames = samples.of(paths, Outside::default(), name)?;
         let found = followed(device, name, set, &follow, &frames)?;
-        let written = write(paths, &frames, samples, &found, target, name)?;
+        let written = write(work, &frames, samples, &found)?;
         let done = format!(
             "{} × {}, {}",
             words::count(set.track_count(), "track"),
@@ -161,7 +160,14 @@ impl Arguments {
     }
 }
 
-/// The bodies of a set at some frames, `[frame][track]`; prints warnings.
+fn only_clip(work: &ClipWork) -> &Motion {
+    let [paths] = work.clips()[..] else {
+        unreachable!("all paths of a file are one clip");
+    };
+    paths
+}
+
+/// The bodies of a set at some frames, `[frame][track]`; warns of those without a clear direction.
 pub(crate) fn followed(
     device: &mut OpenedDevice,
     name: &str,
@@ -176,7 +182,8 @@ pub(crate) fn followed(
         .and_then(|()| device.work(work))
         .map_err(|error| failed(name, &error))?;
     for warning in &found.warnings {
-        words::warning(&format!("{name}: {warning}"));
+        let warning = warning.to_string();
+        words::warn_of(Diagnostic::new(name, Code::BodyDirection, warning));
     }
     Ok(found)
 }
@@ -197,13 +204,13 @@ fn failed(name: &str, error: &Error) -> Failure {
 
 /// Writes positions and rotations: numbers, or a clip with a joint for each body.
 fn write(
-    paths: &Motion,
+    work: &ClipWork,
     frames: &SampleTimes,
     samples: &SampleChoice,
     found: &Followed,
-    target: &ResultTarget,
-    name: &str,
 ) -> Result<WrittenFile, Failure> {
+    let paths = only_clip(work);
+    let (name, target) = (&*work.name, &work.target);
     let set = &paths.set;
     let timeline = frames
         .resolve(set.track_count(), set.time_span())
@@ -254,7 +261,7 @@ fn write(
         scales: Vec::new(),
         scalars: Vec::new(),
     };
-    let notes = [("input", name.to_owned())];
+    let notes = [("input", work.origin())];
     let sampled: [SampledClip<'_>; 1] = [samples.of(&clip, rate, &notes)];
     let options = target.motion_options();
     target.write_motion(|out| format.write_clips(&sampled, &options, out))

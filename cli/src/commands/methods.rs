@@ -32,7 +32,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
                 "nanoseconds_a_rotation": method.cost.rotation,
             })
         });
-        return listing::json(&methods);
+        return listing::records(&methods, &[]);
     }
     let width = METHODS
         .iter()

@@ -142,7 +142,7 @@ impl Character {
             ..ReadOptions::default()
         };
         let loaded = open_target(file, &options).map_err(|fault| Failure::input(&fault, ""))?;
-        words::warnings(&loaded.warnings);
+        loaded.warnings.iter().cloned().for_each(words::warn_of);
         Ok(Self {
             name: file.display().to_string(),
             loaded,
@@ -272,7 +272,7 @@ impl Arguments {
                     "joints other than the hips move by up to {:.4} away from their rest positions, which is lost",
                     report.dropped_translation
                 );
-                work.warn(Diagnostic::new(name, Code::TranslationsDropped, message));
+                words::warn_of(Diagnostic::new(name, Code::TranslationsDropped, message));
             }
             if let Some((joint, angle)) = &report.furthest_dropped {
                 let message = format!(
@@ -281,7 +281,7 @@ impl Arguments {
                     words::count(report.dropped.len(), "joint"),
                     printable(joint)
                 );
-                work.warn(Diagnostic::new(name, Code::RotationsDropped, message));
+                words::warn_of(Diagnostic::new(name, Code::RotationsDropped, message));
             }
             if let Some(axis) = report.stood_along {
                 let axis = axis_name(axis);
@@ -335,7 +335,7 @@ impl Arguments {
                 .write_motion(|out| document.write_instead(&all, &options, target.path(), out));
         }
         let all: Vec<Cow<'_, Motion>> = motions.iter().map(Cow::Borrowed).collect();
-        write_keys(&work.name, &all, None, &options, target)
+        write_keys(work, &all, None, &options)
     }
 }
 

@@ -21,6 +21,7 @@ use crate::batch::entry::InputEntry;
 use crate::batch::room;
 use crate::messages::exit::{ALL_INPUTS, DIFFERENCE, Failure, NO_VULKAN, for_each};
 use crate::messages::progress::Progress;
+use crate::messages::warnings::{self, RecordedWarning, WarningMark};
 use crate::messages::{listing, names, words};
 
 /// Compare a device with the CPU, bit for bit, and both with textbook formulas in f64
@@ -76,6 +77,8 @@ struct VerificationLine {
     /// A Vulkan device gives the CPU's bits, near the reference.
     pass: bool,
     verdict: Verdict,
+    /// About the input, with its first method, and about the method.
+    warnings: Vec<RecordedWarning>,
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
@@ -92,6 +95,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let steps = (inputs.len() * methods.len()) as u64;
     let mut progress = Progress::new("verifying", steps);
     let (mut lines, mut failed) = (Vec::new(), Vec::new());
+    let mark = warnings::mark();
     let mut verify = |path: &Path| {
         let name = names::input(path);
         let loaded = arguments.inputs.load(path)?;
@@ -102,7 +106,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
             };
             let clip = arguments.inputs.tracks.select(clip, &name)?;
             let clip = (&*name, &*clip);
-            let found = arguments.compare(&device, &samples, clip, &methods, &mut progress)?;
+            let found =
+                arguments.compare(&device, &samples, clip, &methods, (&mut progress, mark))?;
             let is_nothing = found.iter().any(|line| line.verdict == Verdict::Nothing);
             lines.extend(found);
             if is_nothing {
@@ -146,7 +151,7 @@ impl Arguments {
         samples: &SampleChoice,
         (name, clip): (&str, &Motion),
         methods: &[Method],
-        progress: &mut Progress,
+        (progress, mark): (&mut Progress, WarningMark),
     ) -> Result<Vec<VerificationLine>, Failure> {
         let set = &clip.set;
         let outside = self.interpolation.outside();
@@ -157,7 +162,7 @@ impl Arguments {
         for &method in methods {
             let interpolation = self.interpolation.with(method);
             if let Some(warning) = curve_warning(name, clip, &interpolation) {
-                words::note(&warning.to_string());
+                words::warn_of(warning);
             }
             let mut found = tumble::verify::verify(&device.engine, set, interpolation, &frames)
                 .map_err(|error| Failure::evaluating(name, &error))?;
@@ -176,6 +181,7 @@ impl Arguments {
                 pass: found.passes(),
                 verdict: found.verdict(),
                 found,
+                warnings: warnings::recorded_since(mark),
             });
             progress.advance(1);
         }

@@ -7,6 +7,7 @@ use serde::Serialize;
 use tumble_formats::motion::Motion;
 
 use crate::messages::exit::Failure;
+use crate::messages::warnings::{self, RecordedWarning, WarningMark};
 use crate::messages::{names, words};
 
 /// A picture, a film or a page, as `--json` prints it.
@@ -22,17 +23,19 @@ pub(crate) struct DrawnFile {
     frames: Option<usize>,
     /// Which device computed it.
     device: String,
+    warnings: Vec<RecordedWarning>,
 }
 
 impl DrawnFile {
-    /// A file that has been written.
-    pub(crate) fn new(inputs: &[PathBuf], output: &Path, device: &str) -> Self {
+    /// A file that has been written. It has the warnings since `mark`.
+    pub(crate) fn new(inputs: &[PathBuf], output: &Path, device: &str, mark: WarningMark) -> Self {
         Self {
             inputs: inputs.iter().map(|path| names::recorded(path)).collect(),
             output: output.display().to_string(),
             output_bytes: bytes(output),
             frames: None,
             device: device.to_owned(),
+            warnings: warnings::recorded_since(mark),
         }
     }
 

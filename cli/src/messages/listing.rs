@@ -8,6 +8,7 @@ use tumble_formats::printable::{printable, printable_lines};
 
 use crate::batch::entry::InputEntry;
 use crate::messages::exit::Failure;
+use crate::messages::warnings::{self, NamedWarning};
 
 /// Writes a listing to standard output. Names in it went through [`printable`], so that none begins a
 /// line. A reader that has seen enough (`| head`) is no failure.
@@ -29,28 +30,61 @@ pub(crate) fn styled(text: &str) -> Result<(), Failure> {
 /// Whether JSON was printed, or begun.
 static HAS_JSON: AtomicBool = AtomicBool::new(false);
 
-/// As [`text`], for programs: pretty-printed JSON.
+/// As [`text`], for programs: an object as JSON, with the warnings of the command.
 pub(crate) fn json(value: &impl serde::Serialize) -> Result<(), Failure> {
+    #[derive(serde::Serialize)]
+    struct WithWarnings<'a, T> {
+        #[serde(flatten)]
+        value: &'a T,
+        warnings: Vec<NamedWarning>,
+    }
+    document(&WithWarnings {
+        value,
+        warnings: warnings::rest(),
+    })
+}
+
+/// As [`json`], exactly this value: a list that has no warnings, or a document that a file has too.
+pub(crate) fn document(value: &impl serde::Serialize) -> Result<(), Failure> {
     HAS_JSON.store(true, Ordering::Relaxed);
     let text =
         serde_json::to_string_pretty(value).expect("names are strings and numbers are numbers");
     styled(&format!("{}\n", json_printable(&text)))
 }
 
-/// As [`json`]: a list of results, and after them of the inputs that failed.
+/// As [`json`]: a list of results, and after them of the inputs that failed. A last record has the warnings that are not
+/// about one of them, if there are any.
 pub(crate) fn records(
     results: &[impl serde::Serialize],
     failed: &[InputEntry],
 ) -> Result<(), Failure> {
     let failed = failed.iter().map(serde_json::to_value);
     let results = results.iter().map(serde_json::to_value);
-    let records: Result<Vec<_>, _> = results.chain(failed).collect();
-    json(&records.expect("names are strings and numbers are numbers"))
+    let warned = warned_record();
+    let warned = warned.iter().map(serde_json::to_value);
+    let records: Result<Vec<_>, _> = results.chain(failed).chain(warned).collect();
+    document(&records.expect("names are strings and numbers are numbers"))
+}
+
+/// The warnings that no record has, as a record.
+#[derive(serde::Serialize)]
+struct WarnedRecord {
+    state: &'static str,
+    warnings: Vec<NamedWarning>,
+}
+
+fn warned_record() -> Option<WarnedRecord> {
+    let rest = warnings::rest();
+    (!rest.is_empty()).then_some(WarnedRecord {
+        state: "warned",
+        warnings: rest,
+    })
 }
 
 /// Prepares for a command's JSON.
 pub(crate) fn begin() {
     HAS_JSON.store(false, Ordering::Relaxed);
+    warnings::begin();
 }
 
 /// The form of the JSON that a command prints.
@@ -82,7 +116,7 @@ pub(crate) fn failed(failure: &Failure, form: JsonForm) -> Result<(), Failure> {
     };
     match form {
         JsonForm::Object => json(&failed),
-        JsonForm::List => json(&[failed]),
+        JsonForm::List => records(&[failed], &[]),
     }
 }
 

@@ -7,4 +7,5 @@ pub(crate) mod listing;
 pub(crate) mod names;
 pub(crate) mod progress;
 pub(crate) mod signals;
+pub(crate) mod warnings;
 pub(crate) mod words;

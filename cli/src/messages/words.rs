@@ -18,6 +18,7 @@ use tumble_formats::printable::printable;
 use tumble_formats::{Diagnostic, Severity};
 
 use crate::messages::progress;
+use crate::messages::warnings::{self, Warning};
 
 /// Whether notes and warnings are left out.
 static QUIET: AtomicBool = AtomicBool::new(false);
@@ -46,8 +47,9 @@ pub(crate) fn error(message: &str) {
     });
 }
 
+/// Warns of something that is not about a single input: the command line, the device, the directory of results.
 pub(crate) fn warning(message: &str) {
-    if is_quiet() {
+    if !warnings::keep(Warning::Other(message.to_owned())) || is_quiet() {
         return;
     }
     let message = printable(message);
@@ -63,8 +65,16 @@ pub(crate) fn note(message: &str) {
     }
 }
 
-/// Prints warnings about an input, or errors of parts of it.
-pub(crate) fn warnings<'a>(warnings: impl IntoIterator<Item = &'a Diagnostic>) {
+/// Warns of something in an input, or about its result. A batch prints it in its summary.
+pub(crate) fn warn_of(warning: Diagnostic) {
+    let text = warning.to_string();
+    if warnings::keep(Warning::OfInput(warning)) {
+        note(&text);
+    }
+}
+
+/// Prints warnings that a batch or a pipeline keeps itself, or errors of parts of an input.
+pub(crate) fn print_kept<'a>(warnings: impl IntoIterator<Item = &'a Diagnostic>) {
     for warning in warnings {
         match warning.code.severity() {
             Severity::Error => line(&warning.to_string()),

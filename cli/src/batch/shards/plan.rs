@@ -12,6 +12,7 @@ use tumble_formats::format::Format;
 use tumble_formats::output::{Output, remove_abandoned};
 
 use crate::arguments::input::{FoundInput, GatheredInputs};
+use crate::arguments::options::changed_options;
 use crate::batch::digest::Digest;
 use crate::batch::entry::{InputEntry, NAME, kernels_sha256};
 use crate::batch::owner::ReplacedOwners;
@@ -23,6 +24,10 @@ use crate::messages::{names, words};
 
 /// The file that records the plan.
 const PLAN_FILE: &str = "plan.json";
+
+/// The command that writes a lost plan again.
+const WRITTEN_AGAIN: &str = "`tumble eval … --shard 1/1 --resume`, with the same inputs and options, writes it again and \
+                             keeps the results that are complete";
 
 /// The most inputs of a shard: if a worker is lost, its shard is evaluated again.
 const MAX_INPUTS: usize = 256;
@@ -160,7 +165,8 @@ impl ShardPlan {
     }
 
     /// Records the plan in the directory before any result is renamed: from then on files with the names
-    /// of its results may be replaced. Any number of processes may do so at once.
+    /// of its results may be replaced. Any number of processes may do so at once. Where the record of this plan was lost,
+    /// the file of one of its shards proves that the results are those of the plan.
     pub(crate) fn claim(
         &self,
         folder: &Path,
@@ -172,12 +178,24 @@ impl ShardPlan {
         if found.as_ref() == Some(&self.recorded) {
             return Ok(());
         }
-        if found.is_some() && !resume && !overwrite {
+        if found.is_none() && self.has_shard(folder) {
+            return self.recorded.write(&opened);
+        }
+        if let Some(found) = found.filter(|_| !overwrite) {
             let shown = folder.display();
-            return Err(Failure::usage(format!(
-                "{shown}: has shards of another list, other options or another tumble; --resume keeps \
-                 what is the same, --overwrite makes all again"
-            )));
+            if found.options != self.recorded.options {
+                let changed = changed_options(&found.options, &self.recorded.options);
+                return Err(Failure::usage(format!(
+                    "{shown}: has shards with another value of {changed}; give it as they have it, another directory, or \
+                     --overwrite to make all again"
+                )));
+            }
+            if !resume {
+                return Err(Failure::usage(format!(
+                    "{shown}: has shards of another list or another tumble; --resume keeps what is the same, \
+                     --overwrite makes all again"
+                )));
+            }
         }
         if let (false, Some(failure)) = (overwrite, self.existing_file(folder, resume)) {
             // Another process may have recorded the same plan meanwhile.
@@ -191,6 +209,13 @@ impl ShardPlan {
             let found = names.zip(&self.inputs);
             let found = found.filter_map(|(name, found)| Some((name?, found)));
             let found: HashMap<&str, &FoundInput> = found.collect();
+            if let Some((result, command)) = record::of_other_command(folder, &found) {
+                let path = folder.join(result);
+                return Err(Failure::usage(format!(
+                    "{}: was made by `tumble {command}`; give another directory, or --overwrite to replace it",
+                    path.display()
+                )));
+            }
             let mut replaced = ReplacedOwners::default();
             for (result, owner) in record::other_owners(folder, &found) {
                 replaced.check(&found[&*result].path, &folder.join(&result), &owner)?;
@@ -198,6 +223,14 @@ impl ShardPlan {
             replaced.note();
         }
         self.recorded.write(&opened)
+    }
+
+    /// Whether the directory has the file of a shard of this plan.
+    fn has_shard(&self, folder: &Path) -> bool {
+        record::numbers(folder).into_iter().any(|shard| {
+            let bytes = record::bytes(folder, shard).unwrap_or_default();
+            record::header(&bytes).is_some_and(|(header, _)| header.plan == self.recorded.plan)
+        })
     }
 
     /// The failure for a file with the name of a result that no manifest lists, or that exists without
@@ -213,9 +246,14 @@ impl ShardPlan {
         let name = self.names.iter().flatten().find(there)?;
         let path = folder.join(name);
         let path = path.display();
-        Some(Failure::usage(format!(
-            "{path}: exists; give --overwrite to replace it (--resume skips what is done)"
-        )))
+        Some(Failure::usage(match resume {
+            true => {
+                format!("{path}: exists, and no manifest lists it; give --overwrite to replace it")
+            }
+            false => format!(
+                "{path}: exists; give --overwrite to replace it (--resume skips what is done)"
+            ),
+        }))
     }
 }
 
@@ -236,6 +274,13 @@ impl RecordedPlan {
             let path = path.display();
             Failure::new(ALL_INPUTS, format!("{path}: cannot be read: {why}"))
         };
+        let damaged = |why: &dyn std::fmt::Display| {
+            let remedy = match Self::count_shards(folder) {
+                0 => "`tumble eval … --shard 1/1 --overwrite` makes all results again",
+                _ => WRITTEN_AGAIN,
+            };
+            refuse(why).hinted(&format!("; remove it; then {remedy}"))
+        };
         let mut bytes = Vec::new();
         let mut open = || {
             // Files in this folder are written and removed, so it must not be a link.
@@ -250,13 +295,13 @@ impl RecordedPlan {
             Err(error) if error.kind() == io::ErrorKind::NotADirectory => return Ok(None),
             Err(error) => return Err(refuse(&error)),
         }
-        let recorded: Self = serde_json::from_slice(&bytes).map_err(|error| refuse(&error))?;
+        let recorded: Self = serde_json::from_slice(&bytes).map_err(|error| damaged(&error))?;
         let Self { shards, inputs, .. } = recorded;
         match (1..=inputs.min(MAX_SHARDS)).contains(&shards) {
             true => Ok(Some(recorded)),
-            false => Err(refuse(&format!(
+            false => Err(damaged(&format!(
                 "it states {shards} shards of {inputs} inputs; a shard has at least one input, and there \
-                 are at most {MAX_SHARDS} shards; remove it"
+                 are at most {MAX_SHARDS} shards"
             ))),
         }
     }
@@ -269,20 +314,24 @@ impl RecordedPlan {
         if is_there(&path) || is_there(&folder.join(NAME)) {
             return None;
         }
+        let shards = Self::count_shards(folder);
+        (shards > 0).then(|| {
+            format!(
+                "{}: is missing, and there are files of {}; {WRITTEN_AGAIN}",
+                path.display(),
+                words::count(shards, "shard")
+            )
+        })
+    }
+
+    /// The number of files of shards in a directory.
+    fn count_shards(folder: &Path) -> usize {
         let is_of_shard = |&shard: &usize| {
             let bytes = record::bytes(folder, shard);
             bytes.is_ok_and(|bytes| record::header(&bytes).is_some())
         };
         let shards = record::numbers(folder).into_iter().filter(is_of_shard);
-        let shards = shards.count();
-        (shards > 0).then(|| {
-            format!(
-                "{}: is missing, and there are files of {}; `tumble eval … --shard 1/1 --resume`, with the same \
-                 inputs and options, writes it again and keeps the results that are complete",
-                path.display(),
-                words::count(shards, "shard")
-            )
-        })
+        shards.count()
     }
 
     /// Writes the record completely; it may replace the same one of another process.

@@ -8,11 +8,13 @@ use serde::{Deserialize, Serialize};
 use tumble_formats::beneath::{is_beneath, open_beneath};
 
 use crate::arguments::input::FoundInput;
+use crate::arguments::options::DEFAULT_COMMAND;
 use crate::batch::digest;
 use crate::batch::entry::{
     self, InputEntry, InputState, ManifestEntry, ManifestLines, PreviousEntries,
 };
 use crate::batch::owner::Owner;
+use crate::messages::warnings::RecordedWarning;
 
 /// The subdirectory of shards in a directory of results.
 pub(crate) const FOLDER: &str = "manifest.d";
@@ -51,6 +53,9 @@ pub(crate) struct RefusedInput {
     /// As in [`InputEntry`].
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub(crate) causes: Vec<String>,
+    /// As in [`InputEntry`].
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(crate) warnings: Vec<RecordedWarning>,
 }
 
 impl RefusedInput {
@@ -64,6 +69,8 @@ impl RefusedInput {
             message: Some(self.message.clone()),
             diagnostic: self.diagnostic.clone(),
             causes: self.causes.clone(),
+            warnings: self.warnings.clone(),
+            command: None,
         }
     }
 }
@@ -228,6 +235,25 @@ pub(crate) fn other_owners(
     owners
 }
 
+/// The first result, of those in `found`, that a directory's manifests have from another command than that of shards,
+/// and this command.
+pub(crate) fn of_other_command(
+    folder: &Path,
+    found: &HashMap<&str, &FoundInput>,
+) -> Option<(String, String)> {
+    let mut first = None;
+    for_each_line(folder, |line| {
+        let entry = ManifestEntry::of_line(line).filter(|_| first.is_none());
+        let other = entry.filter(|entry| {
+            found.contains_key(entry.whole().0) && entry.command() != DEFAULT_COMMAND
+        });
+        first = first
+            .take()
+            .or_else(|| other.map(|entry| (entry.output.clone(), entry.command().to_owned())));
+    });
+    first
+}
+
 /// Passes on the lines of a directory's manifests, those of its shards last: they are newer. They may be a million: one
 /// line is in memory at a time. A line that is not an entry, such as a shard's header, is among them.
 fn for_each_line(folder: &Path, mut each: impl FnMut(&[u8])) {
@@ -239,6 +265,21 @@ fn for_each_line(folder: &Path, mut each: impl FnMut(&[u8])) {
             each(&line);
         }
     }
+}
+
+/// The inputs without results in a directory's manifest, by the names of their results; `None` where there is no
+/// manifest.
+pub(crate) fn merged_failures(folder: &Path) -> Option<HashMap<String, InputEntry>> {
+    let file = entry::open(folder).ok().flatten()?;
+    let lines = BufReader::new(file).split(b'\n').map_while(Result::ok);
+    let failed = lines.filter_map(|line| {
+        let entry = match owner(&line) {
+            Some(_) => None,
+            None => InputEntry::of_line(&line),
+        };
+        entry.filter(|entry| entry.state == InputState::Failed)
+    });
+    Some(failed.map(|entry| (entry.key(), entry)).collect())
 }
 
 /// The entries for the results of one shard: those of the directory's manifest, replaced by those of the

@@ -114,6 +114,7 @@ impl<'a> Shard<'a> {
             result: entry.result,
             diagnostic: entry.diagnostic,
             causes: entry.causes,
+            warnings: entry.warnings,
         });
     }
 

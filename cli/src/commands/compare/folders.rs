@@ -1,7 +1,7 @@
 //! Two directories, such as the results of a batch before and after a change: the files of one relative name are
 //! compared.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
@@ -10,9 +10,9 @@ use tumble_formats::compare::{ChannelDifference, ClipDifference, ScalarDifferenc
 use tumble_formats::motion::ScalarKind;
 use tumble_formats::printable::printable;
 
-use crate::arguments::input::Inputs;
+use crate::arguments::input::{Inputs, directory_failure};
 use crate::commands::compare::text::not_finite;
-use crate::commands::compare::{Arguments, ComparisonReport};
+use crate::commands::compare::{Arguments, ComparisonReport, FaultKind};
 use crate::messages::exit::{ALL_INPUTS, DIFFERENCE, Failure, Outcomes};
 use crate::messages::{listing, names, words};
 
@@ -79,6 +79,9 @@ pub(super) fn run(arguments: &Arguments, folders: [&Path; 2]) -> Result<(), Fail
     let mut by_name: BTreeMap<PathBuf, [Option<PathBuf>; 2]> = BTreeMap::new();
     for (side, folder) in folders.into_iter().enumerate() {
         for found in arguments.inputs.gather_library(folder)?.files {
+            if found.path == folder {
+                return Err(directory_failure(folder));
+            }
             by_name.entry(found.below).or_default()[side] = Some(found.path);
         }
     }
@@ -106,13 +109,20 @@ pub(super) fn run(arguments: &Arguments, folders: [&Path; 2]) -> Result<(), Fail
         );
         return Err(Failure::new(ALL_INPUTS, message));
     }
+    let seconds: Vec<&Path> = pairs.iter().map(|(_, paths)| paths[1]).collect();
+    arguments.check_second_order(&seconds)?;
     let mut outcomes = Outcomes::of(pairs.len());
-    let (mut over, mut partial) = (0, 0);
+    let mut partial = 0;
+    let mut of_kinds: BTreeMap<FaultKind, usize> = BTreeMap::new();
     for (file, paths) in pairs {
         let compared = arguments.compared(paths);
         let (pair, outcome) = match compared {
             Ok((found, rest)) => {
-                over += usize::from(arguments.judge(&found).is_err());
+                let faults = arguments.faults(&found).into_iter();
+                let kinds: BTreeSet<FaultKind> = faults.map(|(kind, _)| kind).collect();
+                for kind in kinds {
+                    *of_kinds.entry(kind).or_default() += 1;
+                }
                 let largest = LargestDifferences::of(&found);
                 partial += usize::from(largest.unshared_seconds > 0.0);
                 (Ok(largest), rest)
@@ -137,9 +147,18 @@ pub(super) fn run(arguments: &Arguments, folders: [&Path; 2]) -> Result<(), Fail
     let has_bound = arguments.tolerance.is_some() || arguments.distance.is_some();
     let missing: usize = report.missing.iter().map(Vec::len).sum();
     let mut faults = Vec::new();
-    if over > 0 {
-        faults.push(format!("{} over the limit", words::count(over, "pair")));
-    }
+    faults.extend(of_kinds.into_iter().map(|(kind, count)| {
+        let pairs = words::count(count, "pair");
+        match kind {
+            FaultKind::Over => format!("{pairs} over the limit"),
+            FaultKind::NotFinite => {
+                format!("{pairs} with numbers that only one has as NaN or infinite")
+            }
+            FaultKind::Missing => {
+                format!("{pairs} with tracks or scalars in only one of the files")
+            }
+        }
+    }));
     if partial > 0 && has_bound {
         faults.push(format!(
             "{} of which one is longer than the other",

@@ -5,6 +5,7 @@ mod table;
 mod text;
 
 use std::borrow::Cow;
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use clap::Args;
@@ -185,6 +186,17 @@ pub(crate) fn partner(all: [&[Option<&str>]; 2], index: usize) -> Option<usize> 
     same.filter(|_| all.iter().all(|names| is_unique(names)))
 }
 
+/// Why a comparison fails.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum FaultKind {
+    /// A difference is over its bound.
+    Over,
+    /// A number is NaN or infinite in only one.
+    NotFinite,
+    /// A track or a scalar is in only one.
+    Missing,
+}
+
 /// The heading of the options for trajectories in help.
 const TRAJECTORIES: &str = "Trajectories";
 
@@ -214,7 +226,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     };
     let paths = [first.as_path(), second.as_path()];
     arguments.check_table(paths)?;
+    arguments.check_second_order(&[paths[1]])?;
     let (report, rest) = arguments.compared(paths)?;
+    arguments.check_effects(&report)?;
     arguments.print(&report)?;
     arguments.judge(&report).and(rest)
 }
@@ -387,15 +401,65 @@ impl Arguments {
         let Some(order) = self.second_source_order else {
             return Ok(Cow::Borrowed(&self.inputs));
         };
-        let format = self.inputs.format(path);
-        if !format.takes(FormatOption::SourceOrder) {
-            return Err(Failure::usage(format!(
-                "--second-source-order has no effect on {}; it is for {}; leave it out",
-                format.name,
-                Format::names_taking(FormatOption::SourceOrder)
-            )));
+        match self.inputs.format(path).takes(FormatOption::SourceOrder) {
+            true => Ok(Cow::Owned(self.inputs.with_source_order(order)?)),
+            false => Ok(Cow::Borrowed(&self.inputs)),
         }
-        Ok(Cow::Owned(self.inputs.with_source_order(order)?))
+    }
+
+    /// Refuses an order of components for second inputs none of which has a choice of orders.
+    fn check_second_order(&self, seconds: &[&Path]) -> Result<(), Failure> {
+        let takes = |path: &&Path| self.inputs.format(path).takes(FormatOption::SourceOrder);
+        if self.second_source_order.is_none() || seconds.iter().any(takes) {
+            return Ok(());
+        }
+        let formats = seconds.iter().map(|path| self.inputs.format(path).name);
+        let formats: BTreeSet<&str> = formats.collect();
+        let formats: Vec<&str> = formats.into_iter().collect();
+        Err(Failure::usage(format!(
+            "--second-source-order has no effect on {}; it is for {}; leave it out",
+            formats.join(", "),
+            Format::names_taking(FormatOption::SourceOrder)
+        )))
+    }
+
+    /// Refuses options for joints, and bounds of other quantities, where only scalars are compared.
+    fn check_effects(&self, report: &ComparisonReport) -> Result<(), Failure> {
+        let ComparisonReport::Clips(all) = report else {
+            return Ok(());
+        };
+        if all.iter().any(|found| found.rotation.is_some()) {
+            return Ok(());
+        }
+        let has = |kind: ScalarKind| {
+            let mut scalars = all.iter().flat_map(|found| &found.scalars);
+            scalars.any(|scalar| scalar.kind.parse() == Ok(kind))
+        };
+        let is_listed = self.json || self.csv;
+        let tolerates = self.tolerance.is_none_or(|bound| bound == 0.0) || has(ScalarKind::Angle);
+        let distances = self.distance.is_none() || has(ScalarKind::Length);
+        for (is_idle, option, remedy) in [
+            (self.world, "--world", "leave it out"),
+            (self.table.ranks(), "--worst-by", "leave it out"),
+            (
+                self.table.limits() && !is_listed,
+                "--top",
+                "leave it out, or list the scalars by --json or --csv",
+            ),
+            (
+                !tolerates,
+                "--tolerance",
+                "none is an angle; leave it out, or require by 0 that all are equal",
+            ),
+            (!distances, "--distance", "none is a length; leave it out"),
+        ] {
+            if is_idle {
+                return Err(Failure::usage(format!(
+                    "{option} has no effect where only scalars are compared; {remedy}"
+                )));
+            }
+        }
+        Ok(())
     }
 
     /// The arrays of two NPY files.
@@ -541,10 +605,24 @@ impl Arguments {
 
     /// Fails where a difference is over its bound.
     fn judge(&self, report: &ComparisonReport) -> Result<(), Failure> {
+        let faults = self.faults(report);
+        let texts: Vec<String> = faults.into_iter().map(|(_, text)| text).collect();
+        match texts.is_empty() {
+            true => Ok(()),
+            false => Err(Failure::new(
+                DIFFERENCE,
+                format!("they differ: {}", texts.join(", ")),
+            )),
+        }
+    }
+
+    /// The faults of a comparison, each with its kind.
+    fn faults(&self, report: &ComparisonReport) -> Vec<(FaultKind, String)> {
         let over = |quantity: &str, largest: f64, bound: Option<f64>, unit: &str| {
             let bound = bound.filter(|&bound| largest > bound)?;
             let largest = words::decimals(largest);
-            Some(format!("{quantity} of {largest}{unit} over {bound}{unit}"))
+            let text = format!("{quantity} of {largest}{unit} over {bound}{unit}");
+            Some((FaultKind::Over, text))
         };
         let mut faults = Vec::new();
         match report {
@@ -554,7 +632,7 @@ impl Arguments {
                     None => over("difference", found.difference.largest, self.tolerance, ""),
                 });
                 if found.not_finite > 0 && self.tolerance.is_some() {
-                    faults.push(text::not_finite(found.not_finite));
+                    faults.push((FaultKind::NotFinite, text::not_finite(found.not_finite)));
                 }
             }
             ComparisonReport::Trajectory(found) => {
@@ -595,23 +673,19 @@ impl Arguments {
                     let has_bound = self.tolerance.is_some() || self.distance.is_some();
                     let missing: usize = found.missing.iter().map(Vec::len).sum();
                     if missing > 0 && has_bound {
-                        faults.push(
-                            words::count(missing, "track") + " in only one of the files (--tracks)",
-                        );
+                        let tracks = words::count(missing, "track");
+                        let text = format!("{tracks} in only one of the files (--tracks)");
+                        faults.push((FaultKind::Missing, text));
                     }
                     let missing: usize = found.missing_scalars.iter().map(Vec::len).sum();
                     if missing > 0 && has_bound {
-                        faults.push(words::count(missing, "scalar") + " in only one of the files");
+                        let scalars = words::count(missing, "scalar");
+                        let text = format!("{scalars} in only one of the files");
+                        faults.push((FaultKind::Missing, text));
                     }
                 }
             }
         }
-        match faults.is_empty() {
-            true => Ok(()),
-            false => Err(Failure::new(
-                DIFFERENCE,
-                format!("they differ: {}", faults.join(", ")),
-            )),
-        }
+        faults
     }
 }

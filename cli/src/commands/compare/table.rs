@@ -41,6 +41,16 @@ impl TableArguments {
         top.or(self.worst_by.map(|_| "--worst-by"))
     }
 
+    /// Whether an option chooses how joints are ranked.
+    pub(super) fn ranks(self) -> bool {
+        self.worst_by.is_some()
+    }
+
+    /// Whether an option limits how many are listed.
+    pub(super) fn limits(self) -> bool {
+        self.top.is_some()
+    }
+
     /// The joints of a comparison, worst first, as many as `--top` says.
     pub(super) fn listed(self, joints: &[JointDifference]) -> Vec<JointDifference> {
         let mut joints = self.ordered(joints);

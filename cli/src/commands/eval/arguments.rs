@@ -1,5 +1,6 @@
 //! The options of `tumble eval`.
 
+use std::fmt;
 use std::ops::RangeInclusive;
 use std::path::Path;
 use std::str::FromStr;
@@ -293,6 +294,15 @@ impl FromStr for ShardSelection {
         part.ok_or_else(|| {
             "give I/N with I from 1 to N, or the number of a shard, from 1".to_owned()
         })
+    }
+}
+
+impl fmt::Display for ShardSelection {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::One(one) => write!(f, "{one}"),
+            Self::Of(index, of) => write!(f, "{index}/{of}"),
+        }
     }
 }
 

@@ -198,7 +198,7 @@ impl EvaluationJob<'_> {
         };
         let selected = self.arguments.inputs.tracks.select(clip, name)?;
         if let Some(warning) = curve_warning(name, &selected, &curve.interpolation(method)) {
-            self.work.warn(warning);
+            words::warn_of(warning);
         }
         Ok(())
     }
@@ -233,8 +233,7 @@ impl EvaluationJob<'_> {
                 lost.join(", ")
             );
             let target = self.work.target.to_string();
-            self.work
-                .warn(Diagnostic::new(target, Code::NoRoom, message));
+            words::warn_of(Diagnostic::new(target, Code::NoRoom, message));
         }
     }
 
@@ -320,10 +319,10 @@ impl EvaluationJob<'_> {
     }
 
     /// How a result was made, for formats that store it.
-    fn notes(&self, name: &str) -> Result<Vec<(&'static str, String)>, Failure> {
+    fn notes(&self) -> Result<Vec<(&'static str, String)>, Failure> {
         let mut notes = vec![
             ("method", self.arguments.method.to_string()),
-            ("input", name.to_owned()),
+            ("input", self.work.origin()),
         ];
         let sha256 = self.work.input.file.sha256().map(str::to_owned);
         // A file that changed since it was read has another hash, so that is an error.
@@ -535,7 +534,7 @@ impl EvaluationJob<'_> {
             device.choose(scalars * timeline.len())?;
             device.work(|engine| or_engine_error(run(engine)))?
         })?;
-        let notes = self.notes(name)?;
+        let notes = self.notes()?;
         let (written, report) = arguments.write(
             dialect,
             &robot,
@@ -567,7 +566,7 @@ impl EvaluationJob<'_> {
             end.warning(rate, of_clip.time_offset, &target.to_string())
         });
         if let Some(warning) = warning {
-            self.work.warn(warning);
+            words::warn_of(warning);
         }
     }
 
@@ -657,7 +656,7 @@ impl EvaluationJob<'_> {
             let (clip, found) = treated.map_err(|error| root.failure(name, &error))?;
             all.push((Cow::Owned(clip), found));
         }
-        let notes = self.notes(name)?;
+        let notes = self.notes()?;
         let sampled: Vec<SampledClip<'_>> = (all.iter().zip(frames))
             .map(|((clip, samples), frames)| samples.of(clip, frames.rate, &notes))
             .collect();
@@ -721,7 +720,7 @@ impl EvaluationJob<'_> {
         let encoding = arguments.output.encoding(arguments.encoding);
         target.has_room(name, set.track_count(), timeline.len(), encoding)?;
         let requested = arguments.layout;
-        let mut notes = self.notes(name)?;
+        let mut notes = self.notes()?;
         notes.extend(samples.rate.map(|rate| ("rate", rate.to_string())));
         let format = target.results()?;
         let order = arguments.order().unwrap_or(format.order);
@@ -946,8 +945,7 @@ impl EvaluationJob<'_> {
             .collect();
         if with_parents.has_unplaced_joints() {
             let message = "joints with a parent have no translations; their positions are those of their parents";
-            self.work
-                .warn(Diagnostic::new(name, Code::NoOffsets, message));
+            words::warn_of(Diagnostic::new(name, Code::NoOffsets, message));
         }
         Ok(Cow::Owned(with_parents))
     }

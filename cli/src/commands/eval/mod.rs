@@ -20,7 +20,6 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         .gather(arguments.sampling.reads_standard_input())?;
     let samples = arguments.checked_samples()?;
     let format = arguments.dialect.format(&arguments.results)?;
-    arguments.inputs.reading.robot()?;
     arguments.choose_keys();
     let (reader, options) = (arguments.inputs.clone(), arguments.options(&samples));
     let work = PlannedWork {

@@ -1,5 +1,7 @@
 //! `tumble eval --shard`: one part of a library, into a directory that other processes fill too.
 
+use std::collections::HashMap;
+use std::ops::RangeInclusive;
 use std::path::Path;
 
 use serde_json::Value;
@@ -8,16 +10,20 @@ use crate::arguments::device::OpenedDevice;
 use crate::arguments::input::{FoundInput, GatheredInputs};
 use crate::arguments::options::ResultOptions;
 use crate::arguments::time::SampleChoice;
+use crate::batch::digest::InputFile;
+use crate::batch::entry::InputEntry;
 use crate::batch::output_plan;
-use crate::batch::pipeline::{BatchOptions, Pipeline, PipelineInputs, PipelineJob};
-use crate::batch::shards::plan::{ShardOptions, ShardPlan};
-use crate::batch::shards::record::ShardHeader;
+use crate::batch::pipeline::{
+    BatchOptions, Pipeline, PipelineInputs, PipelineJob, hash_before_reading,
+};
+use crate::batch::shards::plan::{RecordedPlan, ShardOptions, ShardPlan};
+use crate::batch::shards::record::{self, ShardHeader};
 use crate::batch::shards::run::Shard;
 use crate::batch::target;
 use crate::commands::eval::arguments::{Arguments, ShardSelection};
 use crate::commands::eval::job::evaluate_all;
 use crate::messages::exit::{FailedInputs, Failure};
-use crate::messages::listing;
+use crate::messages::{listing, words};
 
 /// Runs the shards of a part.
 pub(crate) fn run(arguments: &Arguments, part: ShardSelection) -> Result<(), Failure> {
@@ -25,7 +31,7 @@ pub(crate) fn run(arguments: &Arguments, part: ShardSelection) -> Result<(), Fai
     let outcome = run_shards(arguments, part, &mut records);
     // If there are no records, the caller prints only the failure.
     if arguments.results.prints_json() && (outcome.is_ok() || !records.is_empty()) {
-        listing::json(&records)?;
+        listing::records(&records, &[])?;
     }
     outcome
 }
@@ -45,9 +51,21 @@ fn run_shards(
     let request = &evaluator.request;
     let plan = request.plan(arguments, gathered, &sizes, folder, bytes)?;
     let shards = part.shards(plan.cuts.len())?;
-    plan.claim(folder, resume, arguments.results.overwrites())?;
+    if shards.is_empty() {
+        let all = words::count(plan.cuts.len(), "shard");
+        let are = if plan.cuts.len() == 1 { "is" } else { "are" };
+        words::note(&format!(
+            "--shard {part}: there {are} {all}, and none of them is of this part"
+        ));
+        return Ok(());
+    }
+    let merged = merged_part(&evaluator, arguments, &plan, shards.clone(), folder);
+    if merged.is_none() {
+        plan.claim(folder, resume, arguments.results.overwrites())?;
+    }
     let folder = target::opened(folder)?;
     let (mut codes, mut inputs) = (Vec::new(), 0);
+    let mut first_failed = None;
     for number in shards {
         let range = plan.cuts[number - 1].clone();
         inputs += range.len();
@@ -69,13 +87,66 @@ fn run_shards(
         let paths = plan.inputs[range.clone()]
             .iter()
             .map(|found| found.path.clone());
-        let jobs = shard.jobs(paths, &plan.names[range], plan.format);
+        let mut jobs = shard.jobs(paths, &plan.names[range], plan.format);
+        if let Some(failed) = &merged {
+            jobs.retain(|(_, target)| match failed.get(target.name()) {
+                Some(entry) => {
+                    codes.push(entry.code);
+                    first_failed = first_failed.take().or_else(|| entry.message.clone());
+                    if arguments.results.prints_json() {
+                        json.push(serde_json::to_value(entry).expect("strings and numbers"));
+                    }
+                    false
+                }
+                None => true,
+            });
+        }
         evaluator.evaluate(arguments, jobs, &mut shard, json)?;
-        shard.finish()?;
+        if merged.is_none() {
+            shard.finish()?;
+        }
         let failed = shard.header.failed.iter();
         codes.extend(failed.map(|refused| Some(refused.code)));
     }
+    if let Some(first) = first_failed {
+        words::note(&format!(
+            "inputs that failed before the shards were merged are not tried again (--resume without --shard tries them); \
+             the first: {first}"
+        ));
+    }
     FailedInputs::of_codes(codes.into_iter()).outcome_of(inputs)
+}
+
+/// The inputs that failed, if shards were merged and there is nothing to make for these: all other inputs have their
+/// results. A task that is queued again then changes nothing.
+fn merged_part(
+    evaluator: &Evaluator,
+    arguments: &Arguments,
+    plan: &ShardPlan,
+    shards: RangeInclusive<usize>,
+    folder: &Path,
+) -> Option<HashMap<String, InputEntry>> {
+    let is_resumed = arguments.results.is_resumed() && !arguments.results.overwrites();
+    if !is_resumed || RecordedPlan::read(folder).ok()?.is_some() {
+        return None;
+    }
+    let failed = record::merged_failures(folder)?;
+    let options = &evaluator.request.options.text;
+    let limits = arguments.inputs.limits();
+    let is_settled = |shard: usize| {
+        let range = plan.cuts[shard - 1].clone();
+        let names = plan.names[range.clone()].iter().flatten();
+        let names: Vec<&str> = names.map(|name| &**name).collect();
+        let previous = record::previous(folder, shard, &names);
+        let mut inputs = plan.inputs[range.clone()].iter().zip(&plan.names[range]);
+        inputs.all(|(found, name)| {
+            let Ok(name) = name else { return false };
+            let file = InputFile::within(&found.path, limits);
+            let is_done = |hash| previous.is_done(name, hash, options);
+            failed.contains_key(name) || hash_before_reading(&file, limits).is_some_and(is_done)
+        })
+    };
+    shards.into_iter().all(is_settled).then_some(failed)
 }
 
 /// The size of a file; 0 where it cannot be read, which is reported when it is opened.

@@ -40,6 +40,7 @@ use crate::commands::travel::{self, Maker, is_path_file, is_travel};
 use crate::messages::drawn::{DrawnFile, check_has_tracks, note_scalars};
 use crate::messages::exit::{Failure, for_each};
 use crate::messages::progress::Progress;
+use crate::messages::warnings::{self, WarningMark};
 use crate::messages::{listing, names, words};
 use tumble_formats::sample::MethodChoice;
 
@@ -194,9 +195,7 @@ fn note_curves(name: &str, clip: &Motion, choices: &[CurveChoice]) {
     let named = choices.iter().filter_map(|choice| choice.method.0);
     let interpolations = named.map(|method| choices[0].interpolation(method));
     let warnings = interpolations.filter_map(|one| curve_warning(name, clip, &one));
-    for warning in warnings {
-        words::note(&warning.to_string());
-    }
+    warnings.for_each(words::warn_of);
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
@@ -219,6 +218,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         titles: names::distinct_files(&inputs),
         inputs: inputs.clone(),
         drawn: Vec::new(),
+        mark: warnings::mark(),
     };
     if arguments.report {
         return report::write(arguments, &mut writer, &samples);
@@ -511,6 +511,8 @@ pub(crate) struct FigureWriter {
     /// The name of each input in titles.
     titles: Vec<String>,
     drawn: Vec<DrawnFile>,
+    /// When the work on the inputs began.
+    mark: WarningMark,
 }
 
 impl FigureWriter {
@@ -547,7 +549,12 @@ impl FigureWriter {
         destination.write(None, |out| out.write_all(&bytes))?;
         let device = &self.device.label;
         let inputs = [input.to_owned()];
-        (self.drawn).push(DrawnFile::new(&inputs, destination.path(), device));
+        (self.drawn).push(DrawnFile::new(
+            &inputs,
+            destination.path(),
+            device,
+            self.mark,
+        ));
         Ok(())
     }
 }

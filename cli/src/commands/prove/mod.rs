@@ -109,7 +109,7 @@ impl ReportOutput {
             report::write(report, path)?;
         }
         match self.json {
-            true => listing::json(report),
+            true => listing::document(report),
             false => listing::text(page),
         }
     }

@@ -65,6 +65,9 @@ pub(crate) struct Proof {
     pub(crate) figures: Option<Figures>,
     /// Steps that ended with an error.
     pub(crate) failures: Vec<String>,
+    /// Steps that could not measure, which is no part of the verdict.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub(crate) warnings: Vec<String>,
 }
 
 /// Which program ran.

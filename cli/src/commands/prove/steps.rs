@@ -188,6 +188,7 @@ pub(crate) fn prove(options: &ProofOptions) -> Proof {
 fn empty(options: &ProofOptions, vulkan: &VulkanDevice) -> Proof {
     let info = vulkan.info().clone();
     Proof {
+        warnings: Vec::new(),
         format: FORMAT,
         format_version: FORMAT_VERSION,
         verdict: Verdict::NotProved,
@@ -517,7 +518,10 @@ impl ProofRun<'_> {
         // A measurement that does not affect the verdict.
         match compile::measure(&self.vulkan.info().uuid, limit) {
             Ok(times) => self.proof.compile_times = times,
-            Err(reason) => words::warning(&reason),
+            Err(reason) => {
+                words::warning(&reason);
+                self.proof.warnings.push(reason);
+            }
         }
         Ok(())
     }

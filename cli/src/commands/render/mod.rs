@@ -35,6 +35,7 @@ use crate::commands::travel::{Maker, Scenery, TravelSource, is_path_file, is_tra
 use crate::messages::drawn::{DrawnFile, check_has_tracks, note_scalars};
 use crate::messages::exit::Failure;
 use crate::messages::progress::Progress;
+use crate::messages::warnings::WarningMark;
 use crate::messages::{listing, names, signals, words};
 use tumble_formats::sample::MethodChoice;
 
@@ -252,7 +253,12 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         .map_err(|error| Failure::writing(&arguments.out.display().to_string(), &error))?;
     arguments.render_frames(kind, &scene, &timeline, &inputs)?;
     if arguments.json {
-        let film = DrawnFile::new(&inputs, &arguments.out, &device.label);
+        let film = DrawnFile::new(
+            &inputs,
+            &arguments.out,
+            &device.label,
+            WarningMark::default(),
+        );
         listing::records(&[film.with_frames(timeline.len())], &[])?;
     }
     words::note(&format!(
@@ -297,7 +303,7 @@ impl Arguments {
         let mesh = match document.map(|document| document.carried_mesh(&clip)) {
             Some(Ok(mesh)) => mesh,
             Some(Err(fault)) => {
-                words::note(&format!("{fault}; bones are drawn without meshes"));
+                words::warning(&format!("{fault}; bones are drawn without meshes"));
                 None
             }
             None => None,

@@ -25,6 +25,7 @@ use crate::commands::route::tables::Participants;
 use crate::messages::exit::{ALL_INPUTS, Failure, SOME_INPUTS};
 use crate::messages::listing;
 use crate::messages::progress::busy;
+use crate::messages::warnings::{self, RecordedWarning};
 use crate::messages::words;
 use crate::threads::on_threads;
 
@@ -41,6 +42,7 @@ struct RouteReport<'a> {
     /// The distances of the requested ends from the surface.
     off: Option<[f64; 2]>,
     error: Option<&'a str>,
+    warnings: &'a [RecordedWarning],
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
@@ -62,9 +64,11 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let found = busy("finding routes", || {
         find(arguments, &surface, avoided.as_deref(), &participants)
     })?;
-    let outcomes = scheduled(found, &participants);
-    for outcome in &outcomes {
+    let mut outcomes = scheduled(found, &participants);
+    for outcome in &mut outcomes {
+        let mark = warnings::mark();
         warn_of_moved_ends(outcome, surface.size());
+        outcome.warnings = warnings::recorded_since(mark);
     }
     // Drawn before any file is written, so that no file is left if drawing fails.
     let picture = match results.plot() {
@@ -157,6 +161,7 @@ fn scheduled(found: Vec<Result<Route, String>>, participants: &Participants) -> 
     .map(|((route, &ends), name)| RouteOutcome {
         name: name.clone(),
         ends,
+        warnings: Vec::new(),
         found: route.map(|route| {
             let rows = RoutePoint::of_route(&route);
             (route, rows)
@@ -234,7 +239,7 @@ fn report(
     }
     if arguments.json {
         let lines: Vec<RouteReport<'_>> = outcomes.iter().map(line).collect();
-        listing::json(&lines)?;
+        listing::records(&lines, &[])?;
     }
     let name = arguments.surface.display();
     if let [outcome] = outcomes
@@ -279,5 +284,6 @@ fn line(outcome: &RouteOutcome) -> RouteReport<'_> {
         arrival: found.and_then(|(_, rows)| rows.last()?.time),
         off: found.map(|(route, _)| route.off),
         error: outcome.found.as_ref().err().map(String::as_str),
+        warnings: &outcome.warnings,
     }
 }

@@ -12,6 +12,7 @@ use crate::batch::target::{self, Destination};
 use crate::commands::route::arguments::Arguments;
 use crate::commands::route::tables::Participants;
 use crate::messages::exit::Failure;
+use crate::messages::warnings::RecordedWarning;
 
 /// A point of a route.
 pub(super) struct RoutePoint {
@@ -48,6 +49,7 @@ pub(super) struct RouteOutcome {
     pub(super) name: String,
     pub(super) ends: [DVec3; 2],
     pub(super) found: Result<(Route, Vec<RoutePoint>), String>,
+    pub(super) warnings: Vec<RecordedWarning>,
 }
 
 /// The destinations of routes, checked before any work.

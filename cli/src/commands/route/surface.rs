@@ -36,9 +36,7 @@ impl Surface {
         };
         match found.map_err(|fault| Failure::input(&fault, ""))? {
             surface::Surface::Mesh(polygons) => {
-                for warning in &polygons.warnings {
-                    words::note(&warning.to_string());
-                }
+                polygons.warnings.iter().cloned().for_each(words::warn_of);
                 let mesh = Mesh::welded(&polygons.positions, polygons.iter(), weld)
                     .map_err(|error| refused(Code::Mesh, &error))?;
                 for warning in mesh.warnings() {

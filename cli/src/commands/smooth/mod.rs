@@ -17,7 +17,6 @@ use tumble::{
 use tumble_formats::diagnostic::{Code, Diagnostic};
 use tumble_formats::format::{Document, MotionOptions, ResultShape};
 use tumble_formats::motion::{Motion, SampledClip};
-use tumble_formats::printable::printable;
 use tumble_formats::sample::Samples;
 use tumble_formats::smooth::{SmoothJob, SmoothMotionError};
 
@@ -237,10 +236,11 @@ fn smoothed(
         && end - last > 1e-3 * fps.map_or(f64::INFINITY, |rate| rate.time_of(1))
     {
         // A smoothing kernel needs evenly spaced samples, so an additional key at the end is not possible.
-        words::warning(&format!(
-            "{name}: the {} s after the last frame are left out; a rate (--fps) with a frame at the end keeps them",
+        let message = format!(
+            "the {} s after the last frame are left out; a rate (--fps) with a frame at the end keeps them",
             words::seconds(end - last)
-        ));
+        );
+        words::warn_of(Diagnostic::new(name, Code::EndLeftOut, message));
     }
     if let (SmoothingEnds::Loop, Some(last), Some((_, end))) =
         (smoothing.ends, last, clip.set.time_span())
@@ -297,12 +297,13 @@ fn warn_of_open_loop(name: &str, clip: &Motion, samples: &Samples) {
         .enumerate()
         .max_by(|(_, one), (_, other)| one.total_cmp(other));
     if let Some((track, apart)) = largest.filter(|(_, apart)| apart.to_degrees() > CLOSED) {
-        words::warning(&format!(
-            "{name}: --edges loop joins the last sample to the first, and they are up to {:.1}° apart ({}); this is no \
-             loop, or not a whole one",
+        let message = format!(
+            "--edges loop joins the last sample to the first, and they are up to {:.1}° apart ({}); this is no loop, or \
+             not a whole one",
             apart.to_degrees(),
-            printable(&clip.set.track_name(track))
-        ));
+            clip.set.track_name(track)
+        );
+        words::warn_of(Diagnostic::new(name, Code::OpenLoop, message));
     }
 }
 
@@ -321,7 +322,7 @@ fn write(
                 .first()
                 .map_or_else(String::new, |smoothed| smoothed.kernel.to_string()),
         ),
-        ("input", name.to_owned()),
+        ("input", work.origin()),
     ];
     let format = target.format();
     let has_clips = format.takes_motion(clips);
@@ -330,7 +331,7 @@ fn write(
             let name = format.name.to_uppercase();
             let message = format!("{name} cannot store this, left out: the translations");
             let left_out = Diagnostic::new(target.to_string(), Code::NoRoom, message);
-            work.warn(left_out);
+            words::warn_of(left_out);
         }
         let tracks = clip.set.track_count();
         let timeline = SampleTimes::at(after.times.clone())

@@ -34,6 +34,7 @@ use crate::commands::view::shown::{ResultChoice, ShownClip};
 use crate::messages::drawn::{DrawnFile, note_scalars};
 use crate::messages::exit::{Failure, OUTPUT, SOME_INPUTS, for_each};
 use crate::messages::progress::Progress;
+use crate::messages::warnings::WarningMark;
 use crate::messages::{listing, names, words};
 use tumble_formats::sample::MethodChoice;
 
@@ -153,7 +154,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
             {
                 Some(Ok(mesh)) => one.mesh = mesh.filter(|mesh| is_small(mesh, &one.name)),
                 Some(Err(fault)) => {
-                    words::note(&format!("{fault}; bones are shown without meshes"));
+                    words::warning(&format!("{fault}; bones are shown without meshes"));
                 }
                 None => {}
             }
@@ -185,7 +186,12 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let text = arguments.page(&mut shown, &methods, menu, &mut device)?;
     destination.write(None, |out| out.write_all(text.as_bytes()))?;
     if arguments.json {
-        let page = DrawnFile::new(&inputs, destination.path(), &device.label);
+        let page = DrawnFile::new(
+            &inputs,
+            destination.path(),
+            &device.label,
+            WarningMark::default(),
+        );
         listing::records(&[page], &failed)?;
     }
     words::note(&format!(

@@ -609,6 +609,8 @@ impl ClipPair<'_> {
         // If both clips have one track, these are compared whatever their names are.
         let matched = if joints.iter().all(|side| side.len() == 1) {
             JointPairs::in_order(1)
+        } else if joints.iter().any(Joints::is_empty) {
+            JointPairs::in_order(0)
         } else {
             // Formats that require unique names number repeated names, so both clips are compared by numbered names.
             let [first, second] = self.clips.map(|clip| distinct_names(&clip.set));
@@ -652,6 +654,13 @@ impl ClipPair<'_> {
             return Err(CompareError::NoScalarInBoth {
                 inputs: self.inputs.map(str::to_owned),
                 scalars,
+            });
+        }
+        let lone = [first, second].iter().position(|side| side.is_empty());
+        if let Some(side) = lone.filter(|&side| scalars[side] > 0) {
+            return Err(CompareError::OnlyScalars {
+                input: self.inputs[side].to_owned(),
+                other: self.inputs[1 - side].to_owned(),
             });
         }
         let error = first.order_of(second, self.inputs).err();

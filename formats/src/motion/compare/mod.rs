@@ -80,6 +80,14 @@ pub enum CompareError {
         /// The kind of the scalar in each clip.
         kinds: [ScalarKind; 2],
     },
+    /// One clip has only scalars, and none of them corresponds to a scalar of the other, which has tracks.
+    #[error("{input} has only scalars, and none of them has the name of a scalar of {other}")]
+    OnlyScalars {
+        /// Name of the clip without tracks in messages.
+        input: String,
+        /// Name of the other clip.
+        other: String,
+    },
     /// The names do not tell the tracks apart, or a track has another parent.
     #[error("{error}{}", in_world(error))]
     Joints {

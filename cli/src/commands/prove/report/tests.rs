@@ -20,6 +20,7 @@ fn whole() -> Option<Proof> {
     let mut info = device.info().clone();
     info.name = "llvmpipe of a test".to_owned();
     let mut proof = Proof {
+        warnings: Vec::new(),
         format: FORMAT,
         format_version: FORMAT_VERSION,
         verdict: Verdict::NotProved,
