@@ -134,6 +134,16 @@ const REMEDIES: &[(&str, &str, &[&str])] = &[
         &["compare a.dat b.dat --fps 30 --start 1"],
     ),
     (
+        "convert uneven.dat -o o.bvh",
+        "`tumble eval --fps` makes frames at a constant rate",
+        &["eval uneven.dat --fps 30 -o o.bvh"],
+    ),
+    (
+        "eval a.dat -o o.tum",
+        "a trajectory has one: choose one without a parent, such as --tracks 0",
+        &["eval a.dat --tracks 0 -o o.tum"],
+    ),
+    (
         "smooth waves.tum --low-pass 40 -o o.tum",
         "give a lower frequency",
         &["smooth waves.tum --low-pass 2 -o o.tum"],
@@ -178,7 +188,7 @@ fn folder() -> tempfile::TempDir {
 }
 
 fn clear(at: &Path) {
-    for name in ["o.npy", "o.csv", "o.npz", "o.glb", "o.tum"] {
+    for name in ["o.npy", "o.csv", "o.npz", "o.glb", "o.tum", "o.bvh"] {
         let _ = fs::remove_file(at.join(name));
     }
 }

@@ -54,8 +54,8 @@ const ALL: [Foreign; 26] = [
     Foreign {
         extensions: &["xml", "urdf", "mjcf", "xacro", "dae"],
         begins: &[b"<?xml", b"<mujoco", b"<robot", b"<COLLADA"],
-        description: "XML, which contains no motion; for robots (MJCF, URDF), `tumble info` lists bodies and joints, \
-                      and the motion is in another file",
+        description: "XML, which is not read as motion; export an animation of Collada as GLB, FBX or BVH; for robots (MJCF, \
+                      URDF), `tumble info` lists bodies and joints, and the motion is in another file",
     },
     Foreign {
         extensions: &[],

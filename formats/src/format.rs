@@ -16,7 +16,7 @@ use crate::decimal::LARGEST_SECONDS;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::feature::Feature;
 pub use crate::format::write_clips::left_behind;
-pub(crate) use crate::format::write_clips::{check_times, no_offsets};
+pub(crate) use crate::format::write_clips::{check_times, no_offsets, not_one_clip};
 pub use crate::gltf::quantized::Quantization;
 use crate::limits::Limits;
 use crate::motion::carried_mesh::CarriedMesh;

@@ -13,12 +13,13 @@ use crate::decimal::{Decimal, decimal_count, offset_of};
 use crate::diagnostic::{Code, Diagnostic, Location};
 use crate::feature::Feature;
 use crate::format::{
-    Format, FormatOption, Loaded, MotionOptions, ReadOptions, TimeUnit, WriteError,
+    Format, FormatOption, Loaded, MotionOptions, ReadOptions, TimeUnit, WriteError, not_one_clip,
 };
 use crate::motion::grid::restore;
 use crate::motion::keys::{Origin, select};
 use crate::motion::{Joint, Motion, SampledClip, Transform};
 use crate::names::TRAJECTORY_TRACK;
+use crate::printable::printable;
 use crate::quaternion::ComponentOrder;
 use crate::rate::Precision;
 use crate::source::Source;
@@ -350,6 +351,15 @@ fn has_decimal_commas(line: &str) -> bool {
     line.split_whitespace().count() > 1 && words.any(|word| word.trim_matches(',').contains(','))
 }
 
+/// The first track without a parent: its name, or its index if it has none.
+fn root_name(clip: &Motion) -> String {
+    let mut joints = clip.skeleton.iter();
+    let root = joints.position(|joint| joint.parent.is_none()).unwrap_or(0);
+    let name = clip.set.get(root).and_then(|track| track.name);
+    name.filter(|name| !name.is_empty())
+        .map_or_else(|| root.to_string(), |name| printable(name).into_owned())
+}
+
 /// The samples of the only track of the only clip, to be written as a trajectory.
 pub(crate) struct Trajectory<'a> {
     pub(crate) sampled: &'a SampledClip<'a>,
@@ -365,13 +375,19 @@ impl<'a> Trajectory<'a> {
     ) -> Result<Self, WriteError> {
         let refuse = |message: String| Diagnostic::new(&options.name, Code::TumWrite, message);
         let [sampled] = clips else {
-            let message = format!("{} clips; a trajectory is one, choose one", clips.len());
-            return Err(refuse(message).into());
+            return Err(refuse(not_one_clip(clips.len(), "a trajectory")).into());
         };
-        let tracks = sampled.clip.set.track_count();
-        if tracks != 1 {
-            let message = format!("{tracks} tracks; a trajectory is one, choose one");
-            return Err(refuse(message).into());
+        match sampled.clip.set.track_count() {
+            1 => {}
+            0 => return Err(refuse("no tracks; a trajectory has one".to_owned()).into()),
+            tracks => {
+                let message = format!(
+                    "{tracks} tracks; a trajectory has one: choose one without a parent, such as --tracks {} (in Python, \
+                     by Clip.select)",
+                    root_name(sampled.clip)
+                );
+                return Err(refuse(message).into());
+            }
         }
         sampled.checked_len()?;
         Ok(Self { sampled, options })

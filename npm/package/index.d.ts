@@ -9,7 +9,7 @@ export type Layout = "track" | "frame";
 
 /** The curve between keys and outside them. */
 export interface CurveOptions {
-  /** Default: `authored`, the interpolation that the file states for each channel, or bessel-overhauser if it states none. */
+  /** Default: `authored`, the interpolation that the file states for each channel, slerp for BVH, or bessel-overhauser for others that state none. */
   method?: Method;
   /** The boundary condition at the first and the last key. Default: depends on the method. */
   ends?: "parabolic" | "natural" | "clamped" | "secant" | "loop" | "frozen";

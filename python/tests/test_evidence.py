@@ -96,7 +96,7 @@ def rounding_row():
     """IsaacLab's AMP loader rounds the frame that a time follows, so that the part between two frames may be negative."""
     times = np.random.default_rng(1).uniform(0, (FRAMES - 1) / SOURCE, 10_000)
     part = times * SOURCE - np.round(times * SOURCE)
-    return f"| samples between two frames of AMP's loader | {100 * (part < 0).mean():.0f} % extrapolate | none |"
+    return f"| samples between two frames, AMP's loader | {100 * (part < 0).mean():.0f} % are extrapolated | none |"
 
 
 def order_rows(folder):
@@ -112,7 +112,7 @@ def order_rows(folder):
     tilt = np.array([np.cos(0.05), np.sin(0.05), 0, 0])
     turned = tilt[[1, 2, 3, 0]]
     angle = np.degrees(2 * np.arccos(min(1.0, abs(turned[0]))))
-    yield f"| w x y z read as x y z w, of a robot tilted by 6° | it is turned by {angle:.0f}° | E907 where bodies are there |"
+    yield f"| w x y z read as x y z w, of a robot tilted by 6° | it is turned by {angle:.0f}° | E907, if the file has the poses of bodies |"
 
 
 def hips_row():

@@ -13,7 +13,6 @@ use tumble::{
     TrackSet,
 };
 
-use crate::arguments::options::CommandLine;
 use crate::batch::target::{ChunkSink, ResultError};
 use crate::drivers;
 use crate::messages::exit::{DEVICE, Failure};
@@ -94,7 +93,7 @@ pub(crate) struct OpenedDevice {
 /// [`Engine::auto`], repeated here so that small jobs load no driver.
 const MIN_GPU_ROTATIONS: usize = 1 << 20;
 
-/// The devices of jobs whose size decides.
+/// Chooses the device of each job by its size.
 struct ByCost {
     cpu: Engine,
     /// The engine for large jobs, which is opened when the first large job comes.
@@ -169,19 +168,6 @@ impl DeviceArguments {
     /// Whether `--device cpu` is set.
     pub(crate) fn is_cpu(&self) -> bool {
         self.device == DeviceChoice::Cpu
-    }
-
-    /// The same device for commands that compare it with the CPU: the first Vulkan device where the
-    /// command line names none.
-    pub(crate) fn compared(&self, command_line: &CommandLine) -> Self {
-        let device = match command_line.has("device") {
-            true => self.device.clone(),
-            false => DeviceChoice::First,
-        };
-        Self {
-            device,
-            ..self.clone()
-        }
     }
 
     /// Opens the device without checking the other options.

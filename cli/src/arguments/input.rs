@@ -363,7 +363,8 @@ impl UnreadFiles {
         self.endings.insert(ending.into_owned());
     }
 
-    /// `5 files are not read because of their endings (.bak, .txt, none); to read them, name them on the command line`.
+    /// `5 files are not read because of their endings (.bak, .txt, none); name one on the command line to read it, or to
+    /// see why it cannot be read`.
     fn note(&self) {
         if self.count == 0 {
             return;
@@ -377,12 +378,13 @@ impl UnreadFiles {
         if self.endings.len() > listed.len() {
             listed.push("…".to_owned());
         }
-        let (are, their, them) = match self.count {
+        let (are, their, one) = match self.count {
             1 => ("is", "its ending", "it"),
-            _ => ("are", "their endings", "them"),
+            _ => ("are", "their endings", "one"),
         };
         words::note(&format!(
-            "{} {are} not read because of {their} ({}); to read {them}, name {them} on the command line",
+            "{} {are} not read because of {their} ({}); name {one} on the command line to read it, or to see why it \
+             cannot be read",
             words::count(self.count, "file"),
             listed.join(", ")
         ));

@@ -15,7 +15,6 @@ use crate::arguments::input::{self, Inputs};
 use crate::arguments::interpolation::{
     InterpolationArguments, MethodSelection, chosen, curve_warning, methods,
 };
-use crate::arguments::options::CommandLine;
 use crate::arguments::time::{SampleChoice, SamplingArguments};
 use crate::batch::entry::InputEntry;
 use crate::batch::room;
@@ -26,22 +25,20 @@ use crate::messages::{listing, names, words};
 
 /// Compare a device with the CPU, bit for bit, and both with textbook formulas in f64
 #[derive(Debug, Args)]
+#[command(mut_arg("device", |arg| arg.default_value("first")))]
 #[command(after_help = "\
 Every rotation of every frame is computed three times: on the device, by the engine on the CPU, and by \
 a textbook implementation in f64. The bits of the first two must be equal, and the error against the \
 third must be within a bound. Velocities, accelerations and every encoding are compared in the same \
 way. The exit code is 8 if a comparison fails. Without --device, the device is the first Vulkan device, \
-however few rotations there are (other commands take `auto`). If \
-there is none, only the CPU is compared with f64, and the exit code is 5. With --device cpu this \
-comparison is enough, and the exit code is 0.
+however few rotations there are. If there is none, only the CPU is compared with f64, and the exit code \
+is 5. With --device cpu this comparison is enough, and the exit code is 0.
 
 Examples:
   tumble verify data/pendulum.dat
   tumble verify *.dat -m slerp,c2 --fps 240
   tumble verify data/pendulum.dat --device llvmpipe --json")]
 pub(crate) struct Arguments {
-    #[command(flatten)]
-    command_line: CommandLine,
     #[command(flatten)]
     inputs: Inputs,
     /// How to interpolate: the methods to verify, one or several, or all
@@ -91,7 +88,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         .interpolation
         .check(&methods)
         .map_err(Failure::usage)?;
-    let device = arguments.device.compared(&arguments.command_line).open()?;
+    let device = arguments.device.open()?;
     let steps = (inputs.len() * methods.len()) as u64;
     let mut progress = Progress::new("verifying", steps);
     let (mut lines, mut failed) = (Vec::new(), Vec::new());

@@ -259,7 +259,9 @@ impl<R: BufRead> Parser<'_, R> {
     /// Reads `CHANNELS count name…`, on one line.
     fn channels(&mut self, keyword: &Word) -> Result<(), Diagnostic> {
         let Some(count) = self.word_before(&AFTER_CHANNELS) else {
-            let message = "CHANNELS without a number; write `CHANNELS 0`".to_owned();
+            let message = "CHANNELS without a number; write the number of channels and their names, or `CHANNELS 0` for a \
+                           joint that does not move"
+                .to_owned();
             return Err(self.refuse(keyword, Code::BvhChannelCount, message));
         };
         let (mut names, mut named) = (Vec::new(), 0usize);
@@ -271,7 +273,14 @@ impl<R: BufRead> Parser<'_, R> {
             }
         }
         if count.text.parse() != Ok(named) {
-            let message = format!("CHANNELS says `{}`, but {named} names follow", count.text);
+            let message = match (count.text.parse::<usize>(), named) {
+                (Ok(_), 1) => format!("CHANNELS says `{}`, but 1 name follows", count.text),
+                (Ok(_), _) => format!("CHANNELS says `{}`, but {named} names follow", count.text),
+                (Err(_), _) => format!(
+                    "CHANNELS has `{}` instead of the number of channels; write the number, then the names",
+                    count.text
+                ),
+            };
             return Err(self.refuse(&count, Code::BvhChannelCount, message));
         }
         let Some(block) = self.open.last_mut() else {

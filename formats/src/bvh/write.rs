@@ -9,13 +9,17 @@ use tumble::{Channel, EulerSequence, FrameRate};
 
 use crate::bvh::angles;
 use crate::diagnostic::{Code, Diagnostic};
-use crate::format::{MotionOptions, WriteError, no_offsets};
+use crate::format::{MotionOptions, WriteError, no_offsets, not_one_clip};
 use crate::motion::SampledClip;
 use crate::motion::WrittenChannel;
 use crate::motion::origin::coordinate;
 use crate::names::line_name;
 use crate::rate::{RateSource, of};
 use crate::warnings::Warnings;
+
+/// The remedy for samples that BVH cannot store.
+const RESAMPLE: &str =
+    "`tumble eval --fps` makes frames at a constant rate (in Python, tumble.save(…, fps=…))";
 
 /// Up to this angle an f32 is exact to 8e-6 degrees. Larger angles are written with six decimals, so that a wheel
 /// that rotates a hundred times is also read back within 1e-6 rad.
@@ -56,7 +60,7 @@ pub(super) fn write_motion(
 ) -> Result<Vec<Diagnostic>, WriteError> {
     let refuse = |message: String| Diagnostic::new(&options.name, Code::BvhWrite, message);
     let [sampled] = clips else {
-        let message = format!("{} clips; a BVH file holds one, choose one", clips.len());
+        let message = not_one_clip(clips.len(), "a BVH file");
         return Err(refuse(message).into());
     };
     let sequence = options.sequence.map(axes).transpose().map_err(refuse)?;
@@ -145,16 +149,16 @@ fn check(sampled: &SampledClip<'_>) -> io::Result<Result<FrameRate, String>> {
         return Ok(Err("a rotation or translation is not finite".to_owned()));
     }
     let Some(rate) = sampled.rate else {
-        return Ok(Err(
-            "BVH stores frames at a constant rate, which these samples do not have; give one with --fps"
-                .to_owned(),
-        ));
+        return Ok(Err(format!(
+            "BVH stores frames at a constant rate, which these samples do not have; {RESAMPLE}"
+        )));
     };
     let off = |(frame, &time): (usize, &f64)| {
         ((time - times[0]) * rate.per_second() - frame as f64).abs() > 0.01
     };
     if let Some((_, time)) = times.iter().enumerate().find(|&sample| off(sample)) {
-        let message = format!("the sample at {time} s is not at the next frame of {rate} fps");
+        let message =
+            format!("the sample at {time} s is not at the next frame of {rate} fps; {RESAMPLE}");
         return Ok(Err(message));
     }
     Ok(Ok(rate))

@@ -4,7 +4,7 @@ use std::io::{self, Write};
 
 use crate::csv::{ORDER, io_error};
 use crate::diagnostic::{Code, Diagnostic};
-use crate::format::{MotionOptions, WriteError};
+use crate::format::{MotionOptions, WriteError, not_one_clip};
 use crate::motion::SampledClip;
 use crate::motion::poses::{TRANSFORM, WORLD};
 use crate::names::distinct_names;
@@ -22,10 +22,7 @@ pub(crate) fn write_motion(
     out: &mut dyn Write,
 ) -> Result<Vec<Diagnostic>, WriteError> {
     let [sampled] = clips else {
-        let message = format!(
-            "{} clips, and CSV holds one; name one, or write a directory or Parquet",
-            clips.len()
-        );
+        let message = not_one_clip(clips.len(), "CSV") + ", or write a directory or Parquet";
         return Err(Diagnostic::new(&options.name, Code::SeveralClips, message).into());
     };
     let set = &sampled.clip.set;

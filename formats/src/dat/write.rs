@@ -8,7 +8,7 @@ use tumble::TrackSet;
 
 use crate::dat::MAX_BOXES;
 use crate::diagnostic::{Code, Diagnostic};
-use crate::format::{MotionOptions, WriteError, check_times};
+use crate::format::{MotionOptions, WriteError, check_times, not_one_clip};
 use crate::motion::SampledClip;
 
 /// Writes the samples of a clip.
@@ -22,7 +22,7 @@ pub(super) fn write_motion(
 ) -> Result<Vec<Diagnostic>, WriteError> {
     let refuse = |code, message: String| Diagnostic::new(&options.name, code, message);
     let [sampled] = clips else {
-        let message = format!("{} clips; a .dat file holds one, choose one", clips.len());
+        let message = not_one_clip(clips.len(), "a .dat file");
         return Err(refuse(Code::SeveralClips, message).into());
     };
     let tracks = sampled.clip.set.track_count();

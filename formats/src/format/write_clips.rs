@@ -104,6 +104,11 @@ pub(crate) fn check_times(sampled: &SampledClip<'_>, name: &str) -> Result<(), D
     Err(Diagnostic::new(name, Code::TimeNotIncreasing, message))
 }
 
+/// Why a number of clips other than one is not written to a file of a format that holds one.
+pub(crate) fn not_one_clip(count: usize, file: &str) -> String {
+    format!("{count} clips; {file} holds one: choose it with --animation")
+}
+
 /// Refuses times that a reader of this format would take for milliseconds or smaller units ([`TimeUnit::of_large`]).
 fn check_seconds(sampled: &SampledClip<'_>, name: &str) -> Result<(), Diagnostic> {
     let clip = sampled.clip;
@@ -118,8 +123,8 @@ fn check_seconds(sampled: &SampledClip<'_>, name: &str) -> Result<(), Diagnostic
         return Ok(());
     };
     let message = format!(
-        "the time {time} s would be read as one in a smaller unit: seconds since 1970 have ten digits; \
-         give the unit of the input's times"
+        "the time {time} s would be read in a smaller unit, because seconds since 1970 have ten digits; state the unit \
+         of the input's times by --time-unit"
     );
     Err(Diagnostic::new(name, Code::LargeSeconds, message))
 }

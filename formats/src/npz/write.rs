@@ -11,7 +11,7 @@ use zip::{CompressionMethod, ZipWriter};
 
 use crate::array::{ArrayHeader, Element};
 use crate::diagnostic::{Code, Diagnostic};
-use crate::format::{MotionOptions, WriteError};
+use crate::format::{MotionOptions, WriteError, not_one_clip};
 use crate::motion::WrittenJoint;
 use crate::motion::{ChannelInterpolation, Joint, Motion, SampledClip, Scalar};
 use crate::npz::plan::KeyKind;
@@ -210,10 +210,7 @@ pub fn write_npz(
     out: &mut dyn Write,
 ) -> Result<Vec<Diagnostic>, WriteError> {
     let [sampled] = clips else {
-        let message = format!(
-            "{} clips; NPZ holds one: choose it with --animation",
-            clips.len()
-        );
+        let message = not_one_clip(clips.len(), "NPZ");
         return Err(Diagnostic::new(&options.name, Code::OneClip, message).into());
     };
     check(sampled, &options.name)?;

@@ -707,7 +707,8 @@ fn heading_hint(columns: &[String]) -> Option<&'static str> {
     };
     if columns.len() == 1 && first.contains([';', '\t']) {
         return Some(
-            "columns are separated by commas, and numbers have decimal points: convert the file",
+            "columns must be separated by commas, and numbers must have decimal points: export the table again in this \
+             way",
         );
     }
     // A comma at the end of a line makes an empty cell.

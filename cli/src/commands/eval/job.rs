@@ -228,7 +228,7 @@ impl EvaluationJob<'_> {
         lost.extend(scalars.as_deref());
         if !lost.is_empty() {
             let message = format!(
-                "--quantity {} writes no other numbers of the clip; left out: {}; -o FILE.npz has all of them",
+                "--quantity {} is all that the result contains; left out: {}; -o FILE.npz stores them too",
                 self.arguments.output.name(),
                 lost.join(", ")
             );
