@@ -17,8 +17,10 @@ struct MotionDispatch {
     ticks_per_second: f32,
     /// The vector of each joint's state that is stored.
     vector: u32,
-    /// How many numbers of it are stored.
+    /// How many numbers of it, or of its matrix, are stored.
     numbers: u32,
+    /// 1 where matrices are stored column by column, 0 where row by row.
+    detail: u32,
 }
 
 const MOTION_WORKGROUP: u32 = 64;

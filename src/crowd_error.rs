@@ -3,6 +3,7 @@
 use crate::curve::options::InterpolationError;
 use crate::machine::error::VulkanError;
 use crate::memory::OutOfMemoryError;
+use crate::output::encoding::Encoding;
 use crate::output::pose_error::OFFSET_STEP;
 use crate::prepare::error::SetError;
 use crate::threads::OutOfThreadsError;
@@ -245,6 +246,14 @@ pub enum CrowdError {
         "the crowd was not made by an engine on the buffer's Vulkan device; make it with Engine::from_vulkan"
     )]
     OtherDevice,
+    /// States cannot have rotations in this encoding.
+    #[error(
+        "states have rotations as f32, matrix or 6d, not as {encoding}; encode quaternions by Engine::encode"
+    )]
+    StateEncoding {
+        /// The requested encoding.
+        encoding: Encoding,
+    },
     /// Clips are to lie on a device, and the engine is the CPU.
     #[error("the engine is the CPU, which has no memory of its own; open a Vulkan device")]
     OnCpu,

@@ -13,29 +13,33 @@ use tumble::{
     SampleTimes, TrackSet, method,
 };
 
-/// On the threads of an engine, too.
+/// The six numbers are the first two columns of the matrix; on the threads of an engine, too.
 #[test]
-fn matrices_are_those_of_the_encoding_whole_or_their_first_two_columns() {
+fn encodings_on_threads_have_the_same_bits_and_6d_is_two_columns_of_the_matrix() {
     let rotation = |i: u16| Quat::from_rotation_y(0.1 * f32::from(i)) * Quat::from_rotation_x(0.3);
     let rotations: Vec<[f32; 4]> = (0..1000).map(|i| rotation(i).to_array()).collect();
     let engine = Engine::new(Device::Cpu).unwrap();
-    for order in MatrixOrder::ALL {
+    for encoding in Encoding::ALL {
         for count in [0, 1, 256, 1000] {
             let rotations = &rotations[..count];
-            let mut expected = vec![0.0_f32; 9 * count];
-            let bytes = bytemuck::cast_slice_mut(&mut expected);
-            Encoding::Matrix3x3(order).encode(rotations, bytes).unwrap();
-            let mut found = vec![0.0; 9 * count];
-            engine.matrices_into(rotations, order, &mut found).unwrap();
-            assert_eq!(found, expected);
-            let mut six = vec![0.0; 6 * count];
-            engine.matrices_into(rotations, order, &mut six).unwrap();
-            let first = expected.chunks(9).flat_map(|matrix| &matrix[..6]);
-            assert!(six.iter().eq(first));
+            let mut expected = vec![0; encoding.bytes() * count];
+            encoding.encode(rotations, &mut expected).unwrap();
+            let mut found = vec![1; expected.len()];
+            engine.encode(rotations, encoding, &mut found).unwrap();
+            assert_eq!(found, expected, "{encoding}");
         }
-        let refused = engine.matrices_into(&rotations[..2], order, &mut [0.0; 16]);
+        let refused = engine.encode(&rotations[..2], encoding, &mut [0; 5]);
         assert!(matches!(refused, Err(Error::EncodingLength(_))));
     }
+    let mut columns = vec![0.0_f32; 9 * rotations.len()];
+    let bytes = bytemuck::cast_slice_mut(&mut columns);
+    let by_columns = Encoding::Matrix3x3(MatrixOrder::ColumnMajor);
+    by_columns.encode(&rotations, bytes).unwrap();
+    let mut six = vec![0.0_f32; 6 * rotations.len()];
+    let bytes = bytemuck::cast_slice_mut(&mut six);
+    Encoding::SixD.encode(&rotations, bytes).unwrap();
+    let first = columns.chunks(9).flat_map(|matrix| &matrix[..6]);
+    assert!(six.iter().eq(first));
 }
 
 /// The shorter way, whichever quaternion of a rotation it is; on the threads of an engine, too.

@@ -4,6 +4,7 @@
 
 mod contacts;
 pub(crate) mod heading;
+mod heading_frame;
 mod humanml3d;
 mod kimodo;
 mod mirror;
@@ -14,6 +15,7 @@ mod six;
 
 pub use contacts::{ContactLimits, contacts, majority};
 pub use heading::{Ground, facing, forward_heading, twist_heading};
+pub use heading_frame::HeadingFrame;
 pub use humanml3d::{
     HUMANML3D_JOINTS, HUMANML3D_NUMBERS, Humanml3dError, humanml3d, positions_of_humanml3d,
 };

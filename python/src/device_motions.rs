@@ -6,6 +6,7 @@ use numpy::PyReadonlyArray1;
 use pyo3::prelude::*;
 use tumble::crowd::{FrameStep, StateArray};
 use tumble::vulkan::{ExportedResult, VulkanError};
+use tumble::{Encoding, EncodingOptions};
 
 use crate::array_memory::ArrayMemory;
 use crate::cuda::CudaError;
@@ -13,6 +14,7 @@ use crate::device_array::DeviceArray;
 use crate::engine::Engine;
 use crate::errors::{device, guarded, input};
 use crate::motions::{MANY, Motions, of_crowd};
+use crate::output::encoding_named;
 use crate::run::stoppable;
 
 /// The clips of a motion library on a device, which samples them there.
@@ -60,7 +62,7 @@ impl DeviceMotions {
             guarded(|| tumble::crowd::DeviceMotions::new(&engine, tables, parts).map_err(of_crowd))
         })?;
         let is_on_card = py.detach(|| {
-            guarded(|| match device.export(&[], None, &[]) {
+            guarded(|| match device.export(&[], None, &[], Encoding::F32) {
                 Ok((result, _)) => is_on_card(result),
                 Err(tumble::crowd::CrowdError::Vulkan(VulkanError::NoExport { .. })) => Ok(false),
                 Err(error) => Err(of_crowd(error)),
@@ -79,8 +81,10 @@ impl DeviceMotions {
         self.device.bytes()
     }
 
-    /// The arrays with these names, of a shape without the axes of joints and numbers. `frames`: as of `Motions.sample`.
-    #[pyo3(signature = (clip_ids, times, shape, names, frames=None))]
+    /// The arrays with these names, of a shape without the axes of joints and numbers. `rotations`: "quaternion", "matrix"
+    /// or "6d". `frames`: as of `Motions.sample`.
+    #[allow(clippy::too_many_arguments, reason = "keywords")]
+    #[pyo3(signature = (clip_ids, times, shape, names, rotations, frames=None))]
     fn sample(
         &self,
         py: Python<'_>,
@@ -88,6 +92,7 @@ impl DeviceMotions {
         times: PyReadonlyArray1<'_, f64>,
         shape: Vec<usize>,
         names: Vec<String>,
+        rotations: &str,
         frames: Option<(PyReadonlyArray1<'_, f64>, PyReadonlyArray1<'_, f64>)>,
     ) -> PyResult<Vec<DeviceArray>> {
         let motions = self.motions.get();
@@ -95,6 +100,10 @@ impl DeviceMotions {
         let arrays: Vec<StateArray> = arrays
             .collect::<Result<_, _>>()
             .map_err(|error: tumble::UnknownNameError| input(format!("arrays: {error}")))?;
+        let encoding = match rotations {
+            "quaternion" => Encoding::F32,
+            other => encoding_named(other, EncodingOptions::default())?,
+        };
         let at = motions.instances(&clip_ids, &times)?;
         let steps: Option<Vec<FrameStep>> = match &frames {
             Some((rates, lengths)) => {
@@ -110,13 +119,13 @@ impl DeviceMotions {
         }
         let work = || match self.is_on_card {
             true => {
-                let made = self.device.export(&at, steps.as_deref(), &arrays);
+                let made = (self.device).export(&at, steps.as_deref(), &arrays, encoding);
                 let (result, ranges) = made.map_err(of_crowd)?;
                 let memory = ArrayMemory::on_card(result).map_err(|error| of_cuda(&error))?;
                 Ok((memory, ranges))
             }
             false => {
-                let made = self.device.sample(&at, steps.as_deref(), &arrays);
+                let made = (self.device).sample(&at, steps.as_deref(), &arrays, encoding);
                 let (states, ranges) = made.map_err(of_crowd)?;
                 Ok((ArrayMemory::Host(states), ranges))
             }
@@ -128,7 +137,8 @@ impl DeviceMotions {
         })?;
         let memory = Arc::new(memory);
         let array = |(array, range): (&StateArray, std::ops::Range<usize>)| {
-            let shape = [&shape[..], &[motions.joints(), array.numbers()]].concat();
+            let each = array.encoding(encoding).shape();
+            let shape = [&shape[..], &[motions.joints()], each].concat();
             DeviceArray::within(&memory, range.start, shape)
         };
         Ok(arrays.iter().zip(ranges).map(array).collect())

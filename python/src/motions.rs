@@ -1,5 +1,6 @@
 //! The tables behind `tumble.MotionLibrary`: clips of one skeleton, sampled at many times at once.
 
+pub(crate) mod frames;
 pub(crate) mod scalars;
 
 use std::borrow::Cow;
@@ -17,7 +18,7 @@ use tumble::crowd::{
     CrowdError, FrameStep, KeyPrecision, MotionBuilder, MotionClip, MotionStates, MotionTables,
     MotionWords,
 };
-use tumble::{Channel, Device, Error, MatrixOrder, Method, Skeleton, VectorMethod};
+use tumble::{Channel, Device, EncodingOptions, Error, Method, Skeleton, VectorMethod, bytemuck};
 use tumble_formats::motion::Motion;
 use tumble_formats::sample::{ChannelMethods, MethodChoice};
 use tumble_formats::skeleton::{ClipSkeleton, OffsetSource};
@@ -29,7 +30,7 @@ use crate::engine::Engine;
 use crate::errors::{guarded, in_python, input, of_engine, warn_of};
 use crate::evaluate::write_vectors;
 use crate::options::method_named;
-use crate::output::filled;
+use crate::output::{encoding_named, filled};
 use crate::run::stoppable;
 use crate::samples::{joint_offsets, joint_parents};
 
@@ -41,9 +42,6 @@ const FINEST: f64 = 24.0;
 
 /// The longest clip in ticks.
 const LONGEST: f64 = 2.1e9;
-
-/// The number of clips that are reordered together; reordered clips are copies, which take memory.
-const CLIPS_AT_ONCE: usize = 1024;
 
 /// Calls with at least this many joints run in a thread that Ctrl-C can stop; smaller ones end sooner than that.
 pub(crate) const MANY: usize = 1 << 21;
@@ -326,6 +324,20 @@ pub(crate) fn of_pushed(error: CrowdError, listed: ListedClip<'_>) -> PyErr {
     }
 }
 
+/// Why a clip is not added to tables.
+enum ClipFault {
+    /// It cannot be made.
+    NotMade(PyErr),
+    /// It does not fit, or the work ended.
+    NotPushed(CrowdError),
+}
+
+impl From<CrowdError> for ClipFault {
+    fn from(error: CrowdError) -> Self {
+        Self::NotPushed(error)
+    }
+}
+
 /// Tables, with their spans and cells.
 type BuiltTables = (MotionTables, Vec<[u32; 4]>, Vec<[f32; 4]>);
 
@@ -334,18 +346,22 @@ fn built<'a>(
     skeleton: &Skeleton,
     (ticks_per_second, precision): (u32, KeyPrecision),
     clips: &'a [Clip],
-    clip: impl Fn(ListedClip<'a>) -> PyResult<MotionClip<'a>>,
+    clip: impl Fn(ListedClip<'a>) -> PyResult<MotionClip<'a>> + Sync,
 ) -> PyResult<BuiltTables> {
     let made = MotionBuilder::new(skeleton, ticks_per_second, precision);
     let mut builder = made.map_err(of_crowd)?;
     let engine = tumble::Engine::new(Device::Cpu).map_err(|it| of_engine(&it))?;
-    let mut listed = ListedClip::all(clips).peekable();
-    while listed.peek().is_some() {
-        let batch: Vec<ListedClip<'_>> = listed.by_ref().take(CLIPS_AT_ONCE).collect();
-        let made: PyResult<Vec<MotionClip<'_>>> = batch.iter().map(|&it| clip(it)).collect();
-        let pushed = builder.push_all(&engine, &made?);
-        pushed.map_err(|(index, error)| of_pushed(error, batch[index]))?;
-    }
+    let listed = |index: usize| ListedClip {
+        index,
+        clip: &clips[index],
+    };
+    let pushed = builder.push_all(&engine, clips.len(), |index| {
+        clip(listed(index)).map_err(ClipFault::NotMade)
+    });
+    pushed.map_err(|(index, fault)| match fault {
+        ClipFault::NotMade(error) => error,
+        ClipFault::NotPushed(error) => of_pushed(error, listed(index)),
+    })?;
     Ok(builder.finish())
 }
 
@@ -504,6 +520,12 @@ impl Motions {
     #[getter]
     pub(crate) fn joints(&self) -> usize {
         self.tables.joint_count()
+    }
+
+    /// The parent of each joint.
+    #[getter]
+    fn parents(&self) -> Vec<Option<usize>> {
+        self.tables.parents()
     }
 
     /// Fills arrays: rotations, positions, world rotations, velocities and angular velocities, each None
@@ -681,8 +703,8 @@ impl Motions {
     }
 }
 
-/// Fills an array with rotations in another representation: "matrix" (…, 3, 3), "6d" (…, 6), the first two columns, or
-/// "rotvec" (…, 3), of `rotations`, (…, 4), x y z w. They are computed on the threads of the engine.
+/// Fills an array with `rotations`, (…, 4), x y z w, in another representation: "rotvec" (…, 3), or that of an encoding,
+/// such as "matrix" (…, 3, 3) or "6d" (…, 6). They are computed on the threads of the engine.
 #[pyfunction]
 pub(crate) fn represent(
     engine: &Bound<'_, Engine>,
@@ -694,14 +716,11 @@ pub(crate) fn represent(
     if kind == "rotvec" {
         return write_vectors(&engine, rotations, out);
     }
-    let order = match kind {
-        "matrix" => MatrixOrder::RowMajor,
-        _ => MatrixOrder::ColumnMajor,
-    };
+    let encoding = encoding_named(kind, EncodingOptions::default())?;
     let read = rotations.try_readonly()?;
     let quaternions = read.as_slice()?.as_chunks().0;
     filled(out, |numbers| {
-        let encoded = engine.matrices_into(quaternions, order, numbers);
+        let encoded = engine.encode(quaternions, encoding, bytemuck::cast_slice_mut(numbers));
         encoded.map_err(|error| of_engine(&error))
     })
 }
@@ -720,7 +739,7 @@ pub(crate) fn put_w_first(quaternions: &Bound<'_, PyArrayDyn<f32>>) -> PyResult<
 }
 
 /// The memory of an output as rows, one for each joint.
-fn rows<'a, const N: usize>(
+pub(crate) fn rows<'a, const N: usize>(
     of: &'a mut Option<PyReadwriteArrayDyn<'_, f32>>,
     joints: usize,
 ) -> PyResult<&'a mut [[f32; N]]> {

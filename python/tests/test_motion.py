@@ -543,6 +543,158 @@ def test_rotations_have_the_representation_that_is_asked_for(clips, rng):
             library.sample(ids, times, **keywords)
 
 
+ARRAYS = ("rotations", "positions", "world_rotations", "velocities", "angular_velocities")
+
+
+@pytest.mark.parametrize("up", ["y", "z"])
+@pytest.mark.parametrize("heading", ["twist", "x", "z"])
+def test_poses_in_heading_frames_are_those_of_root_motion(clips, rng, heading, up):
+    library = tumble.MotionLibrary(clips)
+    ids, times = library.draw(50, rng)
+    plain = library.sample(ids, times)
+    found = library.sample(ids, times, heading=heading, up=up)
+    axis = None if heading == "twist" else heading
+    features = tumble.features
+    headings = features.heading(plain.world_rotations[:, 0], order="xyzw", up=up, axis=axis)
+    vector = np.eye(3)["xyz".index(up)]
+    back = Rotation.from_rotvec(-headings[:, None] * vector)
+    place = plain.positions[:, 0] * (1 - vector)
+    for joint in range(JOINTS):
+        for name, origin in [("positions", place), ("velocities", 0), ("angular_velocities", 0)]:
+            expected = back.apply(getattr(plain, name)[:, joint] - origin)
+            largest = np.abs(getattr(plain, name)).max()
+            np.testing.assert_allclose(getattr(found, name)[:, joint], expected, rtol=0, atol=2e-7 * largest)
+        q = found.world_rotations[:, joint].astype(float)
+        apart = Rotation.from_quat(q).inv() * back * Rotation.from_quat(plain.world_rotations[:, joint].astype(float))
+        assert apart.magnitude().max() < 5e-7
+    # The root is in place, as `root_motion` leaves it; each pose is a motion of its own.
+    for index in range(5):
+        at, turned = plain.positions[index : index + 1, 0], plain.world_rotations[index : index + 1, 0]
+        _, _, still, upright = features.root_motion(at, turned, order="xyzw", up=up, axis=axis)
+        np.testing.assert_allclose(found.positions[index, 0], still[0], rtol=0, atol=1e-6)
+        np.testing.assert_allclose(found.rotations[index, 0], upright[0], rtol=0, atol=2e-7)
+    np.testing.assert_array_equal(found.rotations[:, 1:], plain.rotations[:, 1:])
+    np.testing.assert_array_equal(found.rotations[:, 0], found.world_rotations[:, 0])
+    # Alone, and in other representations and orders.
+    keywords = {"heading": heading, "up": up}
+    for name in ARRAYS:
+        np.testing.assert_array_equal(getattr(library.sample(ids, times, arrays=[name], **keywords), name), getattr(found, name))
+    six = library.sample(ids, times, rotations="6d", **keywords)
+    np.testing.assert_allclose(
+        six.world_rotations, features.six(found.world_rotations, "six-columns", order="xyzw"), atol=1e-6
+    )
+    np.testing.assert_array_equal(six.positions, found.positions)
+    first = library.sample(ids, times, order="wxyz", **keywords)
+    np.testing.assert_array_equal(first.world_rotations, found.world_rotations[..., [3, 0, 1, 2]])
+    # A window is in the frame of its first state.
+    window = library.sample_windows(ids, times, 4, fps=30, **keywords)
+    np.testing.assert_array_equal(window.positions[:, 0], found.positions)
+    in_world = library.sample_windows(ids, times, 4, fps=30)
+    expected = back.apply(in_world.positions[:, 3, 2] - place)
+    np.testing.assert_allclose(window.positions[:, 3, 2], expected, rtol=0, atol=1e-6)
+
+
+def test_headings_need_the_axis_that_points_up(clips):
+    library = tumble.MotionLibrary(clips)
+    for keywords, words in [
+        ({"heading": "x"}, "give both"),
+        ({"up": "y"}, "give both"),
+        ({"heading": "left", "up": "y"}, "heading: there is no `left`; there are twist, x, y, z"),
+        ({"heading": "x", "up": "x"}, "up: there is no `x`; there are y, z"),
+    ]:
+        with pytest.raises(tumble.InputError, match=words):
+            library.sample(0, 0.0, **keywords)
+
+
+SIDES = ["hips", "spine", "left_arm", "right_arm", "left_leg", "right_leg", "head"]
+TREE = [None, 0, 1, 1, 0, 0, 1]
+
+
+@pytest.fixture
+def bodies(rng):
+    def clip(name, frames, rate):
+        keys = np.stack([smooth(rng, frames) for _ in SIDES])
+        root = np.cumsum(0.05 * rng.normal(size=(frames, 3)), axis=0)
+        offsets = rng.normal(size=(7, 3))
+        offsets[[3, 5]] = offsets[[2, 4]] * [-1, 1, 1]
+        offsets[[0, 1, 6], 0] = 0
+        return tumble.Clip(np.arange(frames) / rate, keys, layout="track", name=name, names=SIDES, parents=TREE, offsets=offsets,
+                           translations=[root, *[None] * 6])
+
+    return [clip(*each) for each in [("walk", 40, 30), ("jump", 9, 24), ("turn", 100, 60)]]
+
+
+def test_mirrored_clips_follow_the_others_and_are_those_of_features(bodies, rng, tmp_path):
+    library = tumble.MotionLibrary(bodies)
+    both = library.with_mirrored("x")
+    assert both.names == ["walk", "jump", "turn", "walk (mirrored)", "jump (mirrored)", "turn (mirrored)"]
+    assert len(both) == 6 and both.nbytes == library.nbytes and len(library) == 3
+    ids, times = both.draw(60, rng)
+    assert (ids < 3).any() and (ids >= 3).any()
+    found, plain = both.sample(ids, times), library.sample(ids % 3, times)
+    pairs, features = tumble.features.mirror_pairs(SIDES), tumble.features
+    image = ids >= 3
+    for name in ARRAYS:
+        of, was = getattr(found, name), getattr(plain, name)
+        np.testing.assert_array_equal(of[~image], was[~image])
+        if name.endswith("rotations"):
+            expected = features.mirrored_rotations(was[image], order="xyzw", axis="x", pairs=pairs)
+        else:
+            expected = features.mirrored_positions(was[image], axis="x", pairs=pairs)
+        # Angular velocities are mirrored as the vectors of rotations.
+        np.testing.assert_array_equal(of[image], -expected if name == "angular_velocities" else expected)
+    # The state is whole: the positions are those of the mirrored rotations along the skeleton.
+    turned = Rotation.from_quat(found.world_rotations[:, 1].astype(float)) * Rotation.from_quat(found.rotations[:, 3].astype(float))
+    apart = turned.inv() * Rotation.from_quat(found.world_rotations[:, 3].astype(float))
+    assert apart.magnitude().max() < 1e-6
+    twice = features.mirrored_positions(found.positions[image], axis="x", pairs=pairs)
+    np.testing.assert_array_equal(twice, plain.positions[image])
+    # Differences, windows, representations and heading frames.
+    window = both.sample_windows(ids, times, 3, fps=30, finite=True, arrays=["velocities"]).velocities
+    was = library.sample_windows(ids % 3, times, 3, fps=30, finite=True, arrays=["velocities"]).velocities
+    np.testing.assert_array_equal(window[image], features.mirrored_positions(was[image], axis="x", pairs=pairs))
+    framed = both.sample(ids, times, heading="twist", up="y", rotations="6d")
+    assert np.abs(framed.positions[:, 0, [0, 2]]).max() < 1e-6
+    # Copies, shards and files.
+    part = both.shard(1, 2)
+    assert part.names == ["jump", "jump (mirrored)"]
+    np.testing.assert_array_equal(part.sample(1, 0.1).positions, both.sample(4, 0.1).positions)
+    both.save(tmp_path / "both.npz")
+    library.save(tmp_path / "one.npz")
+    assert (tmp_path / "both.npz").stat().st_size < (tmp_path / "one.npz").stat().st_size + 4000
+    opened = tumble.MotionLibrary.open(tmp_path / "both.npz")
+    doubled = tumble.MotionLibrary.open(tmp_path / "one.npz").with_mirrored("x")
+    for other in (opened, doubled, pickle.loads(pickle.dumps(both)), pickle.loads(pickle.dumps(opened)), pickle.loads(pickle.dumps(doubled))):
+        assert other.names == both.names and other.sample(ids, times) == found
+    for whole in (opened, doubled):
+        for other in (whole.shard(1, 2), pickle.loads(pickle.dumps(whole.shard(1, 2)))):
+            assert other.names == part.names and other.sample([0, 1], 0.1) == part.sample([0, 1], 0.1)
+    with pytest.raises(tumble.InputError, match="computed on the CPU"):
+        opened._put_on("vulkan")
+
+
+def test_what_has_no_mirror_image_is_refused(bodies, clips):
+    library = tumble.MotionLibrary(bodies)
+    for options, words in [
+        ({"axis": "w"}, "there is no `w`"),
+        ({"axis": "x", "pairs": [0, 1]}, "give 7 indices"),
+        ({"axis": "x", "pairs": [1, 2, 0, 3, 4, 5, 6]}, "partner of its partner"),
+        ({"axis": "x", "pairs": [0, 1, 4, 3, 2, 5, 6]}, r"joint 2 \(left_arm\) and its partner, joint 4 \(left_leg\), do not have"),
+    ]:
+        with pytest.raises(tumble.InputError, match=words):
+            library.with_mirrored(**options)
+    with pytest.raises(tumble.InputError, match="mirror images already"):
+        library.with_mirrored("x").with_mirrored("x")
+    with pytest.raises(tumble.InputError, match="no joint has a name with a side"):
+        tumble.MotionLibrary(clips).with_mirrored("x")
+    lost = tumble.Clip([0.0], [[0, 0, 0, 1]] * 2, layout="track", names=["hips", "left_arm"], parents=[None, 0], offsets=np.eye(3)[:2])
+    with pytest.raises(tumble.InputError, match=r"joint 1 \(left_arm\) has no partner"):
+        tumble.MotionLibrary([lost]).with_mirrored("x")
+    robot = tumble.Clip([0.0, 1.0], [[0, 0, 0, 1]] * 2, parents=[None], scalars={"knee": ([0.0, 1.0], [0.0, 1.0])})
+    with pytest.raises(tumble.InputError, match="knee"):
+        tumble.MotionLibrary([robot]).with_mirrored("x", pairs=[0])
+
+
 def test_packed_libraries_are_small_and_within_their_bound(rng, tmp_path):
     frames = 400
     keys = np.stack([smooth(rng, frames) for _ in range(22)])

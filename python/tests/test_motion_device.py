@@ -56,6 +56,13 @@ def test_arrays_of_a_device_have_the_bits_of_the_cpu(device, clips, rng, options
                 assert array.shape == getattr(expected, name).shape
                 assert (bits(array) == getattr(expected, name).view(np.uint32)).all(), name
     assert found == expected == found
+    for kind in ("matrix", "6d"):
+        arrays = ["world_rotations", "positions", "rotations"]
+        expected, found = (one.sample(ids, at, arrays=arrays, rotations=kind) for one in (cpu, library))
+        for name in arrays:
+            array = getattr(found, name)
+            assert array.shape == getattr(expected, name).shape
+            assert (bits(array) == getattr(expected, name).view(np.uint32)).all(), (name, kind)
     one = library.sample_windows(ids, at, 3, fps=30, arrays=["positions"])
     same = cpu.sample_windows(ids, at, 3, fps=30, arrays=["positions"])
     assert one.velocities is None and (bits(one.positions) == same.positions.view(np.uint32)).all()
@@ -108,9 +115,12 @@ def test_copies_and_shards_are_on_the_device_and_forked_processes_say_that_they_
 
 def test_what_a_device_cannot_do_is_refused(device, clips):
     library = tumble.MotionLibrary(clips, device=device)
-    for options in ({"order": "wxyz"}, {"rotations": "6d"}, {"out": library.sample(0, 0)}):
+    heading = {"heading": "twist", "up": "y"}
+    for options in ({"order": "wxyz"}, {"rotations": "rotvec"}, {"out": library.sample(0, 0)}, heading):
         with pytest.raises(tumble.InputError, match="convert on the device"):
             library.sample(0, 0, **options)
+    with pytest.raises(tumble.InputError, match="without `device`"):
+        library.with_mirrored("x", pairs=range(5))
     for arguments, message in [(([3], [0.0]), "there is no clip 3"), (([0], [np.nan]), "not a number")]:
         with pytest.raises(tumble.InputError, match=message):
             library.sample(*arguments)

@@ -104,6 +104,8 @@ def test_encodings_have_one_name_each(clip, engine):
         ("matrix-3x4", engine.matrices(clip, columns=4, **options)),
     ]:
         assert np.array_equal(engine.encoded(clip, encoding, **options), named), encoding
+    columns = engine.matrices(clip, **options)[..., :2].swapaxes(2, 3)
+    assert np.array_equal(engine.encoded(clip, "6d", **options), columns.reshape(*columns.shape[:2], 6))
     by_columns = engine.encoded(clip, "matrix-3x4", major="column", **options)
     assert np.array_equal(by_columns, engine.matrices(clip, columns=4, **options).swapaxes(2, 3))
     for degrees in [True, False]:

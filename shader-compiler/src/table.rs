@@ -436,7 +436,7 @@ static WHOLE_READS: [Read; 6] = [
 ];
 
 /// Kernels over the states of a library's clips, each with the files that it needs beside the entry point.
-const MOTION: [(&str, &[&str]); 4] = [
+const MOTION: [(&str, &[&str]); 5] = [
     (
         "joints",
         &[
@@ -477,6 +477,7 @@ const MOTION: [(&str, &[&str]); 4] = [
         ],
     ),
     ("store", &["motion/store"]),
+    ("matrices", &["math/matrix", "motion/matrices"]),
 ];
 
 /// The files of the self-test.

@@ -266,88 +266,36 @@ const fn entry(
 }
 
 /// The entry points: those of the kernels in their order, and then those that read texel buffers.
-pub(crate) static ENTRIES: [Entry; 199] = [
+pub(crate) static ENTRIES: [Entry; 220] = [
     entry(0, None, 64, None),
-    entry(1, Some(Global::Dispatch), 64, Some(144)),
-    entry(1, Some(Global::Dispatch), 64, Some(145)),
-    entry(1, Some(Global::Dispatch), 64, Some(146)),
-    entry(1, Some(Global::Dispatch), 64, Some(147)),
-    entry(1, Some(Global::Dispatch), 64, Some(148)),
-    entry(1, Some(Global::Dispatch), 64, Some(149)),
-    entry(1, Some(Global::Dispatch), 64, Some(150)),
-    entry(1, Some(Global::Dispatch), 64, Some(151)),
-    entry(2, Some(Global::Dispatch), 64, Some(152)),
-    entry(2, Some(Global::Dispatch), 64, Some(153)),
-    entry(2, Some(Global::Dispatch), 64, Some(154)),
-    entry(2, Some(Global::Dispatch), 64, Some(155)),
-    entry(2, Some(Global::Dispatch), 64, Some(156)),
-    entry(2, Some(Global::Dispatch), 64, Some(157)),
-    entry(2, Some(Global::Dispatch), 64, Some(158)),
-    entry(2, Some(Global::Dispatch), 64, Some(159)),
-    entry(3, Some(Global::Dispatch), 64, Some(160)),
-    entry(3, Some(Global::Dispatch), 64, Some(161)),
-    entry(3, Some(Global::Dispatch), 64, Some(162)),
-    entry(3, Some(Global::Dispatch), 64, Some(163)),
-    entry(3, Some(Global::Dispatch), 64, Some(164)),
-    entry(3, Some(Global::Dispatch), 64, Some(165)),
-    entry(3, Some(Global::Dispatch), 64, Some(166)),
-    entry(3, Some(Global::Dispatch), 64, Some(167)),
-    entry(4, Some(Global::Dispatch), 64, None),
-    entry(4, Some(Global::Dispatch), 64, None),
-    entry(4, Some(Global::Dispatch), 64, None),
-    entry(4, Some(Global::Dispatch), 64, None),
-    entry(4, Some(Global::Dispatch), 64, None),
-    entry(4, Some(Global::Dispatch), 64, None),
-    entry(4, Some(Global::Dispatch), 64, None),
-    entry(4, Some(Global::Dispatch), 64, None),
-    entry(5, Some(Global::Dispatch), 64, None),
-    entry(5, Some(Global::Dispatch), 64, None),
-    entry(5, Some(Global::Dispatch), 64, None),
-    entry(5, Some(Global::Dispatch), 64, None),
-    entry(5, Some(Global::Dispatch), 64, None),
-    entry(5, Some(Global::Dispatch), 64, None),
-    entry(5, Some(Global::Dispatch), 64, None),
-    entry(5, Some(Global::Dispatch), 64, None),
-    entry(1, Some(Global::Dispatch), 128, None),
-    entry(1, Some(Global::Dispatch), 128, None),
-    entry(1, Some(Global::Dispatch), 128, None),
-    entry(1, Some(Global::Dispatch), 128, None),
-    entry(1, Some(Global::Dispatch), 128, None),
-    entry(1, Some(Global::Dispatch), 128, None),
-    entry(1, Some(Global::Dispatch), 128, None),
-    entry(1, Some(Global::Dispatch), 128, None),
-    entry(2, Some(Global::Dispatch), 128, None),
-    entry(2, Some(Global::Dispatch), 128, None),
-    entry(2, Some(Global::Dispatch), 128, None),
-    entry(2, Some(Global::Dispatch), 128, None),
-    entry(2, Some(Global::Dispatch), 128, None),
-    entry(2, Some(Global::Dispatch), 128, None),
-    entry(2, Some(Global::Dispatch), 128, None),
-    entry(2, Some(Global::Dispatch), 128, None),
-    entry(1, Some(Global::Dispatch), 64, Some(168)),
-    entry(1, Some(Global::Dispatch), 64, Some(169)),
-    entry(1, Some(Global::Dispatch), 64, Some(170)),
-    entry(1, Some(Global::Dispatch), 64, Some(171)),
-    entry(1, Some(Global::Dispatch), 64, Some(172)),
-    entry(1, Some(Global::Dispatch), 64, Some(173)),
-    entry(1, Some(Global::Dispatch), 64, Some(174)),
-    entry(1, Some(Global::Dispatch), 64, Some(175)),
+    entry(1, Some(Global::Dispatch), 64, Some(159)),
+    entry(1, Some(Global::Dispatch), 64, Some(160)),
+    entry(1, Some(Global::Dispatch), 64, Some(161)),
+    entry(1, Some(Global::Dispatch), 64, Some(162)),
+    entry(1, Some(Global::Dispatch), 64, Some(163)),
+    entry(1, Some(Global::Dispatch), 64, Some(164)),
+    entry(1, Some(Global::Dispatch), 64, Some(165)),
+    entry(1, Some(Global::Dispatch), 64, Some(166)),
+    entry(1, Some(Global::Dispatch), 64, Some(167)),
+    entry(2, Some(Global::Dispatch), 64, Some(168)),
+    entry(2, Some(Global::Dispatch), 64, Some(169)),
+    entry(2, Some(Global::Dispatch), 64, Some(170)),
+    entry(2, Some(Global::Dispatch), 64, Some(171)),
+    entry(2, Some(Global::Dispatch), 64, Some(172)),
+    entry(2, Some(Global::Dispatch), 64, Some(173)),
+    entry(2, Some(Global::Dispatch), 64, Some(174)),
+    entry(2, Some(Global::Dispatch), 64, Some(175)),
     entry(2, Some(Global::Dispatch), 64, Some(176)),
-    entry(2, Some(Global::Dispatch), 64, Some(177)),
-    entry(2, Some(Global::Dispatch), 64, Some(178)),
-    entry(2, Some(Global::Dispatch), 64, Some(179)),
-    entry(2, Some(Global::Dispatch), 64, Some(180)),
-    entry(2, Some(Global::Dispatch), 64, Some(181)),
-    entry(2, Some(Global::Dispatch), 64, Some(182)),
-    entry(2, Some(Global::Dispatch), 64, Some(183)),
+    entry(3, Some(Global::Dispatch), 64, Some(177)),
+    entry(3, Some(Global::Dispatch), 64, Some(178)),
+    entry(3, Some(Global::Dispatch), 64, Some(179)),
+    entry(3, Some(Global::Dispatch), 64, Some(180)),
+    entry(3, Some(Global::Dispatch), 64, Some(181)),
+    entry(3, Some(Global::Dispatch), 64, Some(182)),
+    entry(3, Some(Global::Dispatch), 64, Some(183)),
     entry(3, Some(Global::Dispatch), 64, Some(184)),
     entry(3, Some(Global::Dispatch), 64, Some(185)),
-    entry(3, Some(Global::Dispatch), 64, Some(186)),
-    entry(3, Some(Global::Dispatch), 64, Some(187)),
-    entry(3, Some(Global::Dispatch), 64, Some(188)),
-    entry(3, Some(Global::Dispatch), 64, Some(189)),
-    entry(3, Some(Global::Dispatch), 64, Some(190)),
-    entry(3, Some(Global::Dispatch), 64, Some(191)),
+    entry(4, Some(Global::Dispatch), 64, None),
     entry(4, Some(Global::Dispatch), 64, None),
     entry(4, Some(Global::Dispatch), 64, None),
     entry(4, Some(Global::Dispatch), 64, None),
@@ -364,6 +312,8 @@ pub(crate) static ENTRIES: [Entry; 199] = [
     entry(5, Some(Global::Dispatch), 64, None),
     entry(5, Some(Global::Dispatch), 64, None),
     entry(5, Some(Global::Dispatch), 64, None),
+    entry(5, Some(Global::Dispatch), 64, None),
+    entry(1, Some(Global::Dispatch), 128, None),
     entry(1, Some(Global::Dispatch), 128, None),
     entry(1, Some(Global::Dispatch), 128, None),
     entry(1, Some(Global::Dispatch), 128, None),
@@ -380,19 +330,83 @@ pub(crate) static ENTRIES: [Entry; 199] = [
     entry(2, Some(Global::Dispatch), 128, None),
     entry(2, Some(Global::Dispatch), 128, None),
     entry(2, Some(Global::Dispatch), 128, None),
-    entry(6, Some(Global::Rows), 64, Some(192)),
-    entry(6, Some(Global::Rows), 64, Some(193)),
-    entry(7, Some(Global::Rows), 64, Some(194)),
+    entry(2, Some(Global::Dispatch), 128, None),
+    entry(1, Some(Global::Dispatch), 64, Some(186)),
+    entry(1, Some(Global::Dispatch), 64, Some(187)),
+    entry(1, Some(Global::Dispatch), 64, Some(188)),
+    entry(1, Some(Global::Dispatch), 64, Some(189)),
+    entry(1, Some(Global::Dispatch), 64, Some(190)),
+    entry(1, Some(Global::Dispatch), 64, Some(191)),
+    entry(1, Some(Global::Dispatch), 64, Some(192)),
+    entry(1, Some(Global::Dispatch), 64, Some(193)),
+    entry(1, Some(Global::Dispatch), 64, Some(194)),
+    entry(2, Some(Global::Dispatch), 64, Some(195)),
+    entry(2, Some(Global::Dispatch), 64, Some(196)),
+    entry(2, Some(Global::Dispatch), 64, Some(197)),
+    entry(2, Some(Global::Dispatch), 64, Some(198)),
+    entry(2, Some(Global::Dispatch), 64, Some(199)),
+    entry(2, Some(Global::Dispatch), 64, Some(200)),
+    entry(2, Some(Global::Dispatch), 64, Some(201)),
+    entry(2, Some(Global::Dispatch), 64, Some(202)),
+    entry(2, Some(Global::Dispatch), 64, Some(203)),
+    entry(3, Some(Global::Dispatch), 64, Some(204)),
+    entry(3, Some(Global::Dispatch), 64, Some(205)),
+    entry(3, Some(Global::Dispatch), 64, Some(206)),
+    entry(3, Some(Global::Dispatch), 64, Some(207)),
+    entry(3, Some(Global::Dispatch), 64, Some(208)),
+    entry(3, Some(Global::Dispatch), 64, Some(209)),
+    entry(3, Some(Global::Dispatch), 64, Some(210)),
+    entry(3, Some(Global::Dispatch), 64, Some(211)),
+    entry(3, Some(Global::Dispatch), 64, Some(212)),
+    entry(4, Some(Global::Dispatch), 64, None),
+    entry(4, Some(Global::Dispatch), 64, None),
+    entry(4, Some(Global::Dispatch), 64, None),
+    entry(4, Some(Global::Dispatch), 64, None),
+    entry(4, Some(Global::Dispatch), 64, None),
+    entry(4, Some(Global::Dispatch), 64, None),
+    entry(4, Some(Global::Dispatch), 64, None),
+    entry(4, Some(Global::Dispatch), 64, None),
+    entry(4, Some(Global::Dispatch), 64, None),
+    entry(5, Some(Global::Dispatch), 64, None),
+    entry(5, Some(Global::Dispatch), 64, None),
+    entry(5, Some(Global::Dispatch), 64, None),
+    entry(5, Some(Global::Dispatch), 64, None),
+    entry(5, Some(Global::Dispatch), 64, None),
+    entry(5, Some(Global::Dispatch), 64, None),
+    entry(5, Some(Global::Dispatch), 64, None),
+    entry(5, Some(Global::Dispatch), 64, None),
+    entry(5, Some(Global::Dispatch), 64, None),
+    entry(1, Some(Global::Dispatch), 128, None),
+    entry(1, Some(Global::Dispatch), 128, None),
+    entry(1, Some(Global::Dispatch), 128, None),
+    entry(1, Some(Global::Dispatch), 128, None),
+    entry(1, Some(Global::Dispatch), 128, None),
+    entry(1, Some(Global::Dispatch), 128, None),
+    entry(1, Some(Global::Dispatch), 128, None),
+    entry(1, Some(Global::Dispatch), 128, None),
+    entry(1, Some(Global::Dispatch), 128, None),
+    entry(2, Some(Global::Dispatch), 128, None),
+    entry(2, Some(Global::Dispatch), 128, None),
+    entry(2, Some(Global::Dispatch), 128, None),
+    entry(2, Some(Global::Dispatch), 128, None),
+    entry(2, Some(Global::Dispatch), 128, None),
+    entry(2, Some(Global::Dispatch), 128, None),
+    entry(2, Some(Global::Dispatch), 128, None),
+    entry(2, Some(Global::Dispatch), 128, None),
+    entry(2, Some(Global::Dispatch), 128, None),
+    entry(6, Some(Global::Rows), 64, Some(213)),
+    entry(6, Some(Global::Rows), 64, Some(214)),
+    entry(7, Some(Global::Rows), 64, Some(215)),
     entry(8, Some(Global::Dispatch), 64, None),
     entry(9, Some(Global::Dispatch), 64, None),
     entry(10, Some(Global::Dispatch), 64, None),
     entry(11, Some(Global::Dispatch), 64, None),
     entry(12, Some(Global::Dispatch), 64, None),
     entry(13, Some(Global::Dispatch), 64, None),
-    entry(14, Some(Global::Dispatch), 64, Some(195)),
-    entry(14, Some(Global::Dispatch), 64, Some(196)),
-    entry(14, Some(Global::Dispatch), 64, Some(197)),
-    entry(14, Some(Global::Dispatch), 64, Some(198)),
+    entry(14, Some(Global::Dispatch), 64, Some(216)),
+    entry(14, Some(Global::Dispatch), 64, Some(217)),
+    entry(14, Some(Global::Dispatch), 64, Some(218)),
+    entry(14, Some(Global::Dispatch), 64, Some(219)),
     entry(15, Some(Global::Dispatch), 64, None),
     entry(16, Some(Global::Dispatch), 64, None),
     entry(17, Some(Global::Dispatch), 64, None),
@@ -410,6 +424,7 @@ pub(crate) static ENTRIES: [Entry; 199] = [
     entry(25, Some(Global::Dispatch), 64, None),
     entry(26, Some(Global::Dispatch), 64, None),
     entry(27, Some(Global::Dispatch), 64, None),
+    entry(27, Some(Global::Dispatch), 64, None),
     entry(28, Some(Global::Dispatch), 64, None),
     entry(1, Some(Global::Dispatch), 64, None),
     entry(1, Some(Global::Dispatch), 64, None),
@@ -419,6 +434,8 @@ pub(crate) static ENTRIES: [Entry; 199] = [
     entry(1, Some(Global::Dispatch), 64, None),
     entry(1, Some(Global::Dispatch), 64, None),
     entry(1, Some(Global::Dispatch), 64, None),
+    entry(1, Some(Global::Dispatch), 64, None),
+    entry(2, Some(Global::Dispatch), 64, None),
     entry(2, Some(Global::Dispatch), 64, None),
     entry(2, Some(Global::Dispatch), 64, None),
     entry(2, Some(Global::Dispatch), 64, None),
@@ -435,6 +452,8 @@ pub(crate) static ENTRIES: [Entry; 199] = [
     entry(3, Some(Global::Dispatch), 64, None),
     entry(3, Some(Global::Dispatch), 64, None),
     entry(3, Some(Global::Dispatch), 64, None),
+    entry(3, Some(Global::Dispatch), 64, None),
+    entry(1, Some(Global::Dispatch), 64, None),
     entry(1, Some(Global::Dispatch), 64, None),
     entry(1, Some(Global::Dispatch), 64, None),
     entry(1, Some(Global::Dispatch), 64, None),
@@ -451,6 +470,8 @@ pub(crate) static ENTRIES: [Entry; 199] = [
     entry(2, Some(Global::Dispatch), 64, None),
     entry(2, Some(Global::Dispatch), 64, None),
     entry(2, Some(Global::Dispatch), 64, None),
+    entry(2, Some(Global::Dispatch), 64, None),
+    entry(3, Some(Global::Dispatch), 64, None),
     entry(3, Some(Global::Dispatch), 64, None),
     entry(3, Some(Global::Dispatch), 64, None),
     entry(3, Some(Global::Dispatch), 64, None),
@@ -1007,14 +1028,15 @@ pub(crate) fn canonical_product<M: Machine>(
 }
 
 pub(crate) fn cell_at<M: Machine>(machine: &M, index: u32) -> [M::F; 4] {
-    const OF_KERNELS: [u8; 199] = [
+    const OF_KERNELS: [u8; 220] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1,
+        0, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 1, 1, 1, 1,
     ];
     match OF_KERNELS[machine.code()] {
         0 => cell_at_of_readers(machine, index),
@@ -1058,14 +1080,15 @@ pub(crate) fn cell_of<M: Machine>(machine: &M, corner: Corner, iteration: u32) -
 }
 
 pub(crate) fn channel_at<M: Machine>(machine: &M, index: u32) -> CrowdChannel {
-    const OF_KERNELS: [u8; 199] = [
+    const OF_KERNELS: [u8; 220] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1,
+        0, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 1, 1, 1, 1,
     ];
     match OF_KERNELS[machine.code()] {
         0 => channel_at_of_readers(machine, index),
@@ -1124,14 +1147,15 @@ pub(crate) fn composed<M: Machine>(
 }
 
 pub(crate) fn constant_at<M: Machine>(machine: &M, index: u32) -> [M::F; 4] {
-    const OF_KERNELS: [u8; 199] = [
+    const OF_KERNELS: [u8; 220] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
+        1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
+        1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
         1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
-        1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0,
+        1, 1, 1, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => constant_at_of_readers(machine, index),
@@ -1266,14 +1290,15 @@ pub(crate) fn cross3<M: Machine>(machine: &M, a: [M::F; 3], b: [M::F; 3]) -> [M:
 }
 
 pub(crate) fn crowd_work<M: Machine>(machine: &M, index: u32) {
-    const OF_KERNELS: [u8; 199] = [
+    const OF_KERNELS: [u8; 220] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 1, 1, 2, 3, 4, 5, 0, 6, 7, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 2, 3, 4, 5, 0, 6, 7, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 1, 1,
     ];
     match OF_KERNELS[machine.code()] {
         0 => crowd_work_of_rotations(machine, index),
@@ -1508,14 +1533,15 @@ pub(crate) fn cubic_value<M: Machine>(
     channel: CrowdChannel,
     at: CrowdPosition<M::F>,
 ) -> [M::F; 4] {
-    const OF_KERNELS: [u8; 199] = [
+    const OF_KERNELS: [u8; 220] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0,
+        1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => cubic_value_of_plain_cubic(machine, channel, at),
@@ -1608,14 +1634,15 @@ pub(crate) fn cubic_value_of_cubic_or_constant<M: Machine>(
 }
 
 pub(crate) fn distance_at<M: Machine>(machine: &M, index: u32) -> M::F {
-    const OF_KERNELS: [u8; 199] = [
+    const OF_KERNELS: [u8; 220] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1,
-        1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => distance_at_of_readers(machine, index),
@@ -1641,14 +1668,15 @@ pub(crate) fn distance_at_of_readers_2<M: Machine>(machine: &M, index: u32) -> M
 }
 
 pub(crate) fn distance_from_middle<M: Machine>(machine: &M, first: i32, j: u32) -> M::F {
-    const OF_KERNELS: [u8; 199] = [
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0,
-        0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1,
-        1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1,
-        1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+    const OF_KERNELS: [u8; 220] = [
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1,
+        1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1,
+        1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => distance_from_middle_of_frame_distance(machine, first, j),
@@ -1691,14 +1719,15 @@ pub(crate) fn dot4<M: Machine>(machine: &M, a: [M::F; 4], b: [M::F; 4]) -> M::F 
 }
 
 pub(crate) fn entry_at<M: Machine>(machine: &M, index: u32) -> CrowdEntry {
-    const OF_KERNELS: [u8; 199] = [
+    const OF_KERNELS: [u8; 220] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1,
+        1, 2, 2, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 2, 2, 2, 2,
+        0, 0, 0, 0, 0, 0, 2, 2, 2, 2,
     ];
     match OF_KERNELS[machine.code()] {
         0 => entry_at_of_readers(machine, index),
@@ -2013,20 +2042,22 @@ pub(crate) async fn finish_2<M: Machine>(
     rotation: [M::F; 4],
     is_stored: bool,
 ) {
-    const OF_KERNELS: [u8; 199] = [
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 2,
-        3, 0, 1, 0, 1, 0, 0, 2, 3, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 2, 3, 0, 1, 0,
-        1, 0, 0, 2, 3, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+    const OF_KERNELS: [u8; 220] = [
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1,
+        0, 0, 2, 3, 4, 0, 1, 0, 1, 0, 0, 2, 3, 4, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 1, 0, 0, 2, 3, 4, 0, 1, 0, 1, 0, 0, 2, 3, 4, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => finish_2_of_alone(machine, lane, index, rotation, is_stored).await,
         1 => finish_2_of_together(machine, lane, index, rotation, is_stored).await,
         2 => finish_2_of_together_2(machine, lane, index, rotation, is_stored).await,
-        _ => finish_2_of_together_3(machine, lane, index, rotation, is_stored).await,
+        3 => finish_2_of_together_3(machine, lane, index, rotation, is_stored).await,
+        _ => finish_2_of_together_4(machine, lane, index, rotation, is_stored).await,
     }
 }
 
@@ -2117,7 +2148,7 @@ pub(crate) async fn finish_2_of_together_2<M: Machine>(
     );
     if is_stored {
         let _block = machine.block(line!(), 2);
-        let result = parts_2(machine, rotation);
+        let result = parts_3(machine, rotation);
         machine.store::<[M::F; 9]>(Global::Tile, 9 * (lane as usize), result);
     }
     barrier().await;
@@ -2170,7 +2201,7 @@ pub(crate) async fn finish_2_of_together_3<M: Machine>(
     );
     if is_stored {
         let _block = machine.block(line!(), 2);
-        let result = parts_3(machine, rotation);
+        let result = parts_4(machine, rotation);
         machine.store::<[[M::F; 4]; 3]>(Global::Tile, 12 * (lane as usize), result);
     }
     barrier().await;
@@ -2199,6 +2230,59 @@ pub(crate) async fn finish_2_of_together_3<M: Machine>(
             machine.store::<[M::F; 4]>(
                 Global::Rotations,
                 4 * (first.wrapping_add(loaded_4) as usize),
+                loaded_6,
+            );
+        }
+        let loaded_7 = part;
+        part = loaded_7.wrapping_add(LINE);
+    }
+    barrier().await;
+}
+
+pub(crate) async fn finish_2_of_together_4<M: Machine>(
+    machine: &M,
+    lane: u32,
+    index: u32,
+    rotation: [M::F; 4],
+    is_stored: bool,
+) {
+    let mut part: u32 = Default::default();
+    let _block = machine.block(line!(), 7);
+    machine.store::<u32>(
+        Global::IsThere,
+        lane as usize,
+        if is_stored { 1u32 } else { 0u32 },
+    );
+    if is_stored {
+        let _block = machine.block(line!(), 2);
+        let result = parts_2(machine, rotation);
+        machine.store::<[M::F; 6]>(Global::Tile, 6 * (lane as usize), result);
+    }
+    barrier().await;
+    let within = lane & 7u32;
+    let first = index.wrapping_sub(within).wrapping_mul(6u32);
+    part = within;
+    loop {
+        let _block = machine.block(line!(), 13);
+        let loaded = part;
+        if !(loaded < 48u32) {
+            break;
+        }
+        let loaded_2 = part;
+        let value = quotient(loaded_2, 6u32);
+        let other = lane.wrapping_sub(within).wrapping_add(value);
+        let loaded_3 = machine.load::<u32>(Global::IsThere, other as usize);
+        if loaded_3 != 0u32 {
+            let _block = machine.block(line!(), 7);
+            let loaded_4 = part;
+            let loaded_5 = part;
+            let loaded_6 = machine.load::<M::F>(
+                Global::Tile,
+                6 * (other as usize) + loaded_5.wrapping_sub(value.wrapping_mul(6u32)) as usize,
+            );
+            machine.store::<M::F>(
+                Global::Rotations,
+                first.wrapping_add(loaded_4) as usize,
                 loaded_6,
             );
         }
@@ -2440,14 +2524,15 @@ pub(crate) async fn is_any<M: Machine>(machine: &M, condition: bool) -> bool {
 }
 
 pub(crate) fn item_at_item<M: Machine>(machine: &M, index: u32) -> Item<M::F> {
-    const OF_KERNELS: [u8; 199] = [
+    const OF_KERNELS: [u8; 220] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1,
-        1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
-        1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => item_at_item_of_readers(machine, index),
@@ -2672,14 +2757,15 @@ pub(crate) fn layer_value<M: Machine>(
 }
 
 pub(crate) fn layered<M: Machine>(machine: &M, instance: u32, joint: u32, kind: u32) -> [M::F; 4] {
-    const OF_KERNELS: [u8; 199] = [
+    const OF_KERNELS: [u8; 220] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 1, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0,
+        1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 1,
+        0, 0, 0, 0, 0, 0, 0, 1, 0, 1,
     ];
     match OF_KERNELS[machine.code()] {
         0 => layered_of_layers(machine, instance, joint, kind),
@@ -2842,15 +2928,16 @@ pub(crate) fn magnitude<M: Machine>(machine: &M, x: M::F) -> M::F {
 }
 
 pub(crate) async fn main<M: Machine>(machine: &M) {
-    const OF_KERNELS: [u8; 199] = [
-        0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 2, 2, 2, 2, 2, 2, 2, 2, 3, 3, 3, 3, 3,
-        3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 4, 5, 4, 4, 6, 7, 4, 5, 4, 5, 4, 4, 6, 7, 4, 5, 8, 8, 8,
-        8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 9, 9, 9, 9, 9, 9, 9, 9, 10, 10, 10, 10, 10, 10, 10,
-        10, 10, 10, 10, 10, 10, 10, 10, 10, 11, 12, 11, 11, 13, 14, 11, 12, 11, 12, 11, 11, 13, 14,
-        11, 12, 15, 16, 17, 18, 18, 18, 18, 18, 18, 19, 19, 19, 19, 19, 19, 19, 19, 20, 19, 19, 21,
-        21, 22, 22, 23, 23, 24, 24, 24, 24, 25, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 2,
-        2, 2, 2, 2, 2, 2, 2, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 9, 9, 9, 9, 9, 9, 9,
-        9, 15, 16, 17, 19, 19, 19, 19,
+    const OF_KERNELS: [u8; 220] = [
+        0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 2, 2, 2, 2, 2, 2, 2, 2, 2, 3, 3,
+        3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 4, 5, 4, 4, 6, 7, 8, 4, 5, 4, 5, 4, 4, 6,
+        7, 8, 4, 5, 9, 9, 9, 9, 9, 9, 9, 9, 9, 9, 9, 9, 9, 9, 9, 9, 9, 9, 10, 10, 10, 10, 10, 10,
+        10, 10, 10, 11, 11, 11, 11, 11, 11, 11, 11, 11, 11, 11, 11, 11, 11, 11, 11, 11, 11, 12, 13,
+        12, 12, 14, 15, 16, 12, 13, 12, 13, 12, 12, 14, 15, 16, 12, 13, 17, 18, 19, 20, 20, 20, 20,
+        20, 20, 21, 21, 21, 21, 21, 21, 21, 21, 22, 21, 21, 23, 23, 24, 24, 25, 25, 26, 26, 26, 26,
+        26, 27, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 2, 2, 2, 2, 2, 2, 2, 2, 2, 9,
+        9, 9, 9, 9, 9, 9, 9, 9, 9, 9, 9, 9, 9, 9, 9, 9, 9, 10, 10, 10, 10, 10, 10, 10, 10, 10, 17,
+        18, 19, 21, 21, 21, 21,
     ];
     match OF_KERNELS[machine.code()] {
         0 => main_of_self_test(machine).await,
@@ -2861,23 +2948,25 @@ pub(crate) async fn main<M: Machine>(machine: &M) {
         5 => main_of_together(machine).await,
         6 => main_of_together_2(machine).await,
         7 => main_of_together_3(machine).await,
-        8 => main_of_runs_2(machine).await,
-        9 => main_of_samples_2(machine).await,
-        10 => main_of_coalesced_2(machine).await,
-        11 => main_of_alone_2(machine).await,
-        12 => main_of_together_4(machine).await,
+        8 => main_of_together_4(machine).await,
+        9 => main_of_runs_2(machine).await,
+        10 => main_of_samples_2(machine).await,
+        11 => main_of_coalesced_2(machine).await,
+        12 => main_of_alone_2(machine).await,
         13 => main_of_together_5(machine).await,
         14 => main_of_together_6(machine).await,
-        15 => main_of_from_keys(machine).await,
-        16 => main_of_from_keys_2(machine).await,
-        17 => main_of_from_keys_3(machine).await,
-        18 => main_of_poses(machine).await,
-        19 => main_of_crowd(machine).await,
-        20 => main_of_walk_all(machine).await,
-        21 => main_of_whole_rotations(machine).await,
-        22 => main_of_whole_matrices(machine).await,
-        23 => main_of_subgroup_rotations(machine).await,
-        24 => main_of_motion(machine).await,
+        15 => main_of_together_7(machine).await,
+        16 => main_of_together_8(machine).await,
+        17 => main_of_from_keys(machine).await,
+        18 => main_of_from_keys_2(machine).await,
+        19 => main_of_from_keys_3(machine).await,
+        20 => main_of_poses(machine).await,
+        21 => main_of_crowd(machine).await,
+        22 => main_of_walk_all(machine).await,
+        23 => main_of_whole_rotations(machine).await,
+        24 => main_of_whole_matrices(machine).await,
+        25 => main_of_subgroup_rotations(machine).await,
+        26 => main_of_motion(machine).await,
         _ => main_of_prepare_arcs(machine).await,
     }
 }
@@ -3477,7 +3566,7 @@ pub(crate) async fn main_of_together_2<M: Machine>(machine: &M) {
                 rotation = result_4;
             }
             let loaded_11 = rotation;
-            let result_5 = parts_2(machine, loaded_11);
+            let result_5 = parts_3(machine, loaded_11);
             all_parts = result_5;
             part = 0u32;
             loop {
@@ -3686,7 +3775,7 @@ pub(crate) async fn main_of_together_3<M: Machine>(machine: &M) {
                 rotation = result_4;
             }
             let loaded_11 = rotation;
-            let result_5 = parts_3(machine, loaded_11);
+            let result_5 = parts_4(machine, loaded_11);
             all_parts = result_5;
             part = 0u32;
             loop {
@@ -3784,6 +3873,215 @@ pub(crate) async fn main_of_together_3<M: Machine>(machine: &M) {
                 machine.store::<[M::F; 4]>(
                     Global::Rotations,
                     4 * (stored_2.wrapping_add(loaded_33) as usize),
+                    loaded_35,
+                );
+                let loaded_36 = part_3;
+                part_3 = loaded_36.wrapping_add(lanes);
+            }
+        }
+        let loaded_37 = first_j;
+        first_j = loaded_37.wrapping_add(all.step);
+        let loaded_38 = iteration;
+        iteration = loaded_38.wrapping_add(1u32);
+        let loaded_39 = iteration;
+        if loaded_39 >= iterations {
+            break;
+        }
+    }
+}
+
+pub(crate) async fn main_of_together_4<M: Machine>(machine: &M) {
+    let group = machine.ids().workgroup_id;
+    let invocation = machine.ids().local_invocation_index;
+    let mut item: SpreadRun<M::F> = Default::default();
+    let mut first_j: u32 = Default::default();
+    let mut iteration: u32 = 0u32;
+    let mut rotation: [M::F; 4] = Default::default();
+    let mut all_parts: [M::F; 6] = Default::default();
+    let mut part: u32 = Default::default();
+    let mut part_2: u32 = Default::default();
+    let mut end_lane: u32 = Default::default();
+    let mut part_3: u32 = Default::default();
+    let _block = machine.block(line!(), 58);
+    let all = machine.load::<Spread>(Global::Dispatch, 0);
+    let lanes = 1u32 << all.lanes_log2;
+    let first_index = group[0].wrapping_mul(SPREAD_WORKGROUP >> all.lanes_log2);
+    if first_index >= all.item_count {
+        return;
+    }
+    let result = item_at_spread_run(machine, all.first_item.wrapping_add(first_index));
+    let iterations = result.iterations;
+    let index = first_index.wrapping_add(invocation >> all.lanes_log2);
+    if index < all.item_count {
+        let _block = machine.block(line!(), 3);
+        let result_2 = item_at_spread_run(machine, all.first_item.wrapping_add(index));
+        item = result_2;
+    }
+    let first_repetition = group[2].wrapping_mul(all.layer_repetitions);
+    let repetition = first_repetition.wrapping_add(invocation & all.track_mask);
+    let is_there = repetition < all.repetitions;
+    let loaded = item;
+    let location = location_of(machine, loaded, repetition);
+    let loaded_2 = item.count;
+    let has_segment = is_there & (loaded_2 & IS_CONSTANT == 0u32);
+    let segment = segment_at_arc_segment(machine, if has_segment { location[0] } else { 0u32 });
+    let constant = constant_of_arc_segment(machine, segment);
+    let loaded_3 = item;
+    let count = sample_count(machine, loaded_3);
+    let lane_count = if is_there { count } else { 0u32 };
+    let tracks = all.repetitions.wrapping_sub(first_repetition);
+    let used_lanes = if (all.track_mask != 0u32) & (tracks < lanes) {
+        tracks
+    } else {
+        lanes
+    };
+    let lane = invocation & lanes.wrapping_sub(1u32);
+    let run_values = invocation.wrapping_sub(lane).wrapping_mul(6u32);
+    let lane_part = (lane & 0xfffffff8u32)
+        .wrapping_mul(6u32)
+        .wrapping_add(lane & 7u32);
+    let first = location[1].wrapping_sub((invocation & all.track_mask).wrapping_mul(all.outputs));
+    let first_part = first.wrapping_mul(6u32).wrapping_add(lane_part);
+    let stride = all.stride.wrapping_mul(6u32);
+    let fills_lines = (lanes >= LINE) & (used_lanes == lanes) & (count > all.sample_mask);
+    let filling = if fills_lines {
+        count.wrapping_sub(all.sample_mask)
+    } else {
+        0u32
+    };
+    let sample_lane = invocation & all.sample_mask;
+    first_j = 0u32.wrapping_sub(first & all.line_mask);
+    loop {
+        let _block = machine.block(line!(), 21);
+        let loaded_4 = iteration;
+        let values = (loaded_4 & 1u32)
+            .wrapping_mul(SPREAD_WORKGROUP)
+            .wrapping_mul(6u32)
+            .wrapping_add(run_values);
+        let loaded_5 = first_j;
+        let j = loaded_5.wrapping_add(sample_lane);
+        if j < lane_count {
+            let _block = machine.block(line!(), 13);
+            rotation = <[M::F; 4]>::default();
+            let loaded_6 = item.count;
+            let loaded_7 = item.key;
+            if (loaded_6 < NEEDS_CARE) & ((j != 0u32) | (loaded_7 == NO_KEY)) {
+                let _block = machine.block(line!(), 6);
+                let loaded_8 = item;
+                let loaded_9 = item.first;
+                let result_3 = evaluate_near_arc_segment(
+                    machine,
+                    loaded_8,
+                    segment,
+                    constant,
+                    loaded_9.wrapping_add(j as i32),
+                );
+                rotation = result_3;
+            } else {
+                let _block = machine.block(line!(), 3);
+                let loaded_10 = item;
+                let result_4 = sample_of_arc_segment(machine, loaded_10, segment, j, repetition);
+                rotation = result_4;
+            }
+            let loaded_11 = rotation;
+            let result_5 = parts_2(machine, loaded_11);
+            all_parts = result_5;
+            part = 0u32;
+            loop {
+                let _block = machine.block(line!(), 13);
+                let loaded_12 = part;
+                if !(loaded_12 < 6u32) {
+                    break;
+                }
+                let loaded_13 = part;
+                let loaded_14 = part;
+                let loaded_15 = all_parts[loaded_14 as usize];
+                machine.store::<M::F>(
+                    Global::Tile,
+                    values
+                        .wrapping_add(lane.wrapping_mul(6u32))
+                        .wrapping_add(loaded_13) as usize,
+                    loaded_15,
+                );
+                let loaded_16 = part;
+                part = loaded_16.wrapping_add(1u32);
+            }
+        }
+        barrier().await;
+        let loaded_17 = first_j;
+        if loaded_17 < filling {
+            let _block = machine.block(line!(), 5);
+            let found = values.wrapping_add(lane_part);
+            let loaded_18 = first_j;
+            let stored = first_part.wrapping_add(loaded_18.wrapping_mul(stride));
+            part_2 = 0u32;
+            loop {
+                let _block = machine.block(line!(), 14);
+                let loaded_19 = part_2;
+                if !(loaded_19 < 6u32) {
+                    break;
+                }
+                let loaded_20 = part_2;
+                let loaded_21 = part_2;
+                let loaded_22 = machine.load::<M::F>(
+                    Global::Tile,
+                    found.wrapping_add(loaded_21.wrapping_mul(LINE)) as usize,
+                );
+                machine.store::<M::F>(
+                    Global::Rotations,
+                    stored.wrapping_add(loaded_20.wrapping_mul(LINE)) as usize,
+                    loaded_22,
+                );
+                let loaded_23 = part_2;
+                part_2 = loaded_23.wrapping_add(1u32);
+            }
+        } else {
+            let _block = machine.block(line!(), 18);
+            let loaded_24 = first_j;
+            let loaded_25 = first_j;
+            let first_lane = if (loaded_25 as i32) < 0i32 {
+                0u32.wrapping_sub(loaded_24)
+            } else {
+                0u32
+            };
+            let loaded_26 = first_j;
+            let last_j = loaded_26.wrapping_add(all.sample_mask);
+            end_lane = used_lanes;
+            if last_j >= count {
+                let _block = machine.block(line!(), 11);
+                let missing = if all.track_mask != 0u32 {
+                    lanes
+                } else {
+                    last_j.wrapping_add(1u32).wrapping_sub(count)
+                };
+                let loaded_27 = end_lane;
+                let loaded_28 = end_lane;
+                let loaded_29 = end_lane;
+                end_lane = loaded_27.wrapping_sub(if missing > loaded_29 {
+                    loaded_28
+                } else {
+                    missing
+                });
+            }
+            let loaded_30 = first_j;
+            let stored_2 = first
+                .wrapping_mul(6u32)
+                .wrapping_add(loaded_30.wrapping_mul(stride));
+            part_3 = first_lane.wrapping_mul(6u32).wrapping_add(lane);
+            loop {
+                let _block = machine.block(line!(), 14);
+                let loaded_31 = part_3;
+                let loaded_32 = end_lane;
+                if !(loaded_31 < loaded_32.wrapping_mul(6u32)) {
+                    break;
+                }
+                let loaded_33 = part_3;
+                let loaded_34 = part_3;
+                let loaded_35 =
+                    machine.load::<M::F>(Global::Tile, values.wrapping_add(loaded_34) as usize);
+                machine.store::<M::F>(
+                    Global::Rotations,
+                    stored_2.wrapping_add(loaded_33) as usize,
                     loaded_35,
                 );
                 let loaded_36 = part_3;
@@ -4070,7 +4368,7 @@ pub(crate) async fn main_of_alone_2<M: Machine>(machine: &M) {
     }
 }
 
-pub(crate) async fn main_of_together_4<M: Machine>(machine: &M) {
+pub(crate) async fn main_of_together_5<M: Machine>(machine: &M) {
     let group = machine.ids().workgroup_id;
     let invocation = machine.ids().local_invocation_index;
     let mut item: SpreadRun<M::F> = Default::default();
@@ -4281,7 +4579,7 @@ pub(crate) async fn main_of_together_4<M: Machine>(machine: &M) {
     }
 }
 
-pub(crate) async fn main_of_together_5<M: Machine>(machine: &M) {
+pub(crate) async fn main_of_together_6<M: Machine>(machine: &M) {
     let group = machine.ids().workgroup_id;
     let invocation = machine.ids().local_invocation_index;
     let mut item: SpreadRun<M::F> = Default::default();
@@ -4377,7 +4675,7 @@ pub(crate) async fn main_of_together_5<M: Machine>(machine: &M) {
                 rotation = result_4;
             }
             let loaded_11 = rotation;
-            let result_5 = parts_2(machine, loaded_11);
+            let result_5 = parts_3(machine, loaded_11);
             all_parts = result_5;
             part = 0u32;
             loop {
@@ -4492,7 +4790,7 @@ pub(crate) async fn main_of_together_5<M: Machine>(machine: &M) {
     }
 }
 
-pub(crate) async fn main_of_together_6<M: Machine>(machine: &M) {
+pub(crate) async fn main_of_together_7<M: Machine>(machine: &M) {
     let group = machine.ids().workgroup_id;
     let invocation = machine.ids().local_invocation_index;
     let mut item: SpreadRun<M::F> = Default::default();
@@ -4588,7 +4886,7 @@ pub(crate) async fn main_of_together_6<M: Machine>(machine: &M) {
                 rotation = result_4;
             }
             let loaded_11 = rotation;
-            let result_5 = parts_3(machine, loaded_11);
+            let result_5 = parts_4(machine, loaded_11);
             all_parts = result_5;
             part = 0u32;
             loop {
@@ -4686,6 +4984,217 @@ pub(crate) async fn main_of_together_6<M: Machine>(machine: &M) {
                 machine.store::<[M::F; 4]>(
                     Global::Rotations,
                     4 * (stored_2.wrapping_add(loaded_33) as usize),
+                    loaded_35,
+                );
+                let loaded_36 = part_3;
+                part_3 = loaded_36.wrapping_add(lanes);
+            }
+        }
+        let loaded_37 = first_j;
+        first_j = loaded_37.wrapping_add(all.step);
+        let loaded_38 = iteration;
+        iteration = loaded_38.wrapping_add(1u32);
+        let loaded_39 = iteration;
+        if loaded_39 >= iterations {
+            break;
+        }
+    }
+}
+
+pub(crate) async fn main_of_together_8<M: Machine>(machine: &M) {
+    let group = machine.ids().workgroup_id;
+    let invocation = machine.ids().local_invocation_index;
+    let mut item: SpreadRun<M::F> = Default::default();
+    let mut first_j: u32 = Default::default();
+    let mut iteration: u32 = 0u32;
+    let mut rotation: [M::F; 4] = Default::default();
+    let mut all_parts: [M::F; 6] = Default::default();
+    let mut part: u32 = Default::default();
+    let mut part_2: u32 = Default::default();
+    let mut end_lane: u32 = Default::default();
+    let mut part_3: u32 = Default::default();
+    let _block = machine.block(line!(), 58);
+    let all = machine.load::<Spread>(Global::Dispatch, 0);
+    let lanes = 1u32 << all.lanes_log2;
+    let first_index = group[0].wrapping_mul(SPREAD_WORKGROUP >> all.lanes_log2);
+    if first_index >= all.item_count {
+        return;
+    }
+    let result = item_at_spread_run(machine, all.first_item.wrapping_add(first_index));
+    let iterations = result.iterations;
+    let index = first_index.wrapping_add(invocation >> all.lanes_log2);
+    if index < all.item_count {
+        let _block = machine.block(line!(), 3);
+        let result_2 = item_at_spread_run(machine, all.first_item.wrapping_add(index));
+        item = result_2;
+    }
+    let first_repetition = group[2].wrapping_mul(all.layer_repetitions);
+    let repetition = first_repetition.wrapping_add(invocation & all.track_mask);
+    let is_there = repetition < all.repetitions;
+    let loaded = item;
+    let location = location_of(machine, loaded, repetition);
+    let loaded_2 = item.count;
+    let has_segment = is_there & (loaded_2 & IS_CONSTANT == 0u32);
+    let segment =
+        segment_at_polynomial_segment(machine, if has_segment { location[0] } else { 0u32 });
+    let constant = constant_of_polynomial_segment(machine, segment);
+    let loaded_3 = item;
+    let count = sample_count(machine, loaded_3);
+    let lane_count = if is_there { count } else { 0u32 };
+    let tracks = all.repetitions.wrapping_sub(first_repetition);
+    let used_lanes = if (all.track_mask != 0u32) & (tracks < lanes) {
+        tracks
+    } else {
+        lanes
+    };
+    let lane = invocation & lanes.wrapping_sub(1u32);
+    let run_values = invocation.wrapping_sub(lane).wrapping_mul(6u32);
+    let lane_part = (lane & 0xfffffff8u32)
+        .wrapping_mul(6u32)
+        .wrapping_add(lane & 7u32);
+    let first = location[1].wrapping_sub((invocation & all.track_mask).wrapping_mul(all.outputs));
+    let first_part = first.wrapping_mul(6u32).wrapping_add(lane_part);
+    let stride = all.stride.wrapping_mul(6u32);
+    let fills_lines = (lanes >= LINE) & (used_lanes == lanes) & (count > all.sample_mask);
+    let filling = if fills_lines {
+        count.wrapping_sub(all.sample_mask)
+    } else {
+        0u32
+    };
+    let sample_lane = invocation & all.sample_mask;
+    first_j = 0u32.wrapping_sub(first & all.line_mask);
+    loop {
+        let _block = machine.block(line!(), 21);
+        let loaded_4 = iteration;
+        let values = (loaded_4 & 1u32)
+            .wrapping_mul(SPREAD_WORKGROUP)
+            .wrapping_mul(6u32)
+            .wrapping_add(run_values);
+        let loaded_5 = first_j;
+        let j = loaded_5.wrapping_add(sample_lane);
+        if j < lane_count {
+            let _block = machine.block(line!(), 13);
+            rotation = <[M::F; 4]>::default();
+            let loaded_6 = item.count;
+            let loaded_7 = item.key;
+            if (loaded_6 < NEEDS_CARE) & ((j != 0u32) | (loaded_7 == NO_KEY)) {
+                let _block = machine.block(line!(), 6);
+                let loaded_8 = item;
+                let loaded_9 = item.first;
+                let result_3 = evaluate_near_polynomial_segment(
+                    machine,
+                    loaded_8,
+                    segment,
+                    constant,
+                    loaded_9.wrapping_add(j as i32),
+                );
+                rotation = result_3;
+            } else {
+                let _block = machine.block(line!(), 3);
+                let loaded_10 = item;
+                let result_4 =
+                    sample_of_polynomial_segment(machine, loaded_10, segment, j, repetition);
+                rotation = result_4;
+            }
+            let loaded_11 = rotation;
+            let result_5 = parts_2(machine, loaded_11);
+            all_parts = result_5;
+            part = 0u32;
+            loop {
+                let _block = machine.block(line!(), 13);
+                let loaded_12 = part;
+                if !(loaded_12 < 6u32) {
+                    break;
+                }
+                let loaded_13 = part;
+                let loaded_14 = part;
+                let loaded_15 = all_parts[loaded_14 as usize];
+                machine.store::<M::F>(
+                    Global::Tile,
+                    values
+                        .wrapping_add(lane.wrapping_mul(6u32))
+                        .wrapping_add(loaded_13) as usize,
+                    loaded_15,
+                );
+                let loaded_16 = part;
+                part = loaded_16.wrapping_add(1u32);
+            }
+        }
+        barrier().await;
+        let loaded_17 = first_j;
+        if loaded_17 < filling {
+            let _block = machine.block(line!(), 5);
+            let found = values.wrapping_add(lane_part);
+            let loaded_18 = first_j;
+            let stored = first_part.wrapping_add(loaded_18.wrapping_mul(stride));
+            part_2 = 0u32;
+            loop {
+                let _block = machine.block(line!(), 14);
+                let loaded_19 = part_2;
+                if !(loaded_19 < 6u32) {
+                    break;
+                }
+                let loaded_20 = part_2;
+                let loaded_21 = part_2;
+                let loaded_22 = machine.load::<M::F>(
+                    Global::Tile,
+                    found.wrapping_add(loaded_21.wrapping_mul(LINE)) as usize,
+                );
+                machine.store::<M::F>(
+                    Global::Rotations,
+                    stored.wrapping_add(loaded_20.wrapping_mul(LINE)) as usize,
+                    loaded_22,
+                );
+                let loaded_23 = part_2;
+                part_2 = loaded_23.wrapping_add(1u32);
+            }
+        } else {
+            let _block = machine.block(line!(), 18);
+            let loaded_24 = first_j;
+            let loaded_25 = first_j;
+            let first_lane = if (loaded_25 as i32) < 0i32 {
+                0u32.wrapping_sub(loaded_24)
+            } else {
+                0u32
+            };
+            let loaded_26 = first_j;
+            let last_j = loaded_26.wrapping_add(all.sample_mask);
+            end_lane = used_lanes;
+            if last_j >= count {
+                let _block = machine.block(line!(), 11);
+                let missing = if all.track_mask != 0u32 {
+                    lanes
+                } else {
+                    last_j.wrapping_add(1u32).wrapping_sub(count)
+                };
+                let loaded_27 = end_lane;
+                let loaded_28 = end_lane;
+                let loaded_29 = end_lane;
+                end_lane = loaded_27.wrapping_sub(if missing > loaded_29 {
+                    loaded_28
+                } else {
+                    missing
+                });
+            }
+            let loaded_30 = first_j;
+            let stored_2 = first
+                .wrapping_mul(6u32)
+                .wrapping_add(loaded_30.wrapping_mul(stride));
+            part_3 = first_lane.wrapping_mul(6u32).wrapping_add(lane);
+            loop {
+                let _block = machine.block(line!(), 14);
+                let loaded_31 = part_3;
+                let loaded_32 = end_lane;
+                if !(loaded_31 < loaded_32.wrapping_mul(6u32)) {
+                    break;
+                }
+                let loaded_33 = part_3;
+                let loaded_34 = part_3;
+                let loaded_35 =
+                    machine.load::<M::F>(Global::Tile, values.wrapping_add(loaded_34) as usize);
+                machine.store::<M::F>(
+                    Global::Rotations,
+                    stored_2.wrapping_add(loaded_33) as usize,
                     loaded_35,
                 );
                 let loaded_36 = part_3;
@@ -5497,20 +6006,22 @@ pub(crate) fn matrix_rows<M: Machine>(
 }
 
 pub(crate) fn motion_work<M: Machine>(machine: &M, index: u32) {
-    const OF_KERNELS: [u8; 199] = [
+    const OF_KERNELS: [u8; 220] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 2, 3, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 1, 2, 3, 4, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => motion_work_of_joints(machine, index),
         1 => motion_work_of_walk(machine, index),
         2 => motion_work_of_differences(machine, index),
-        _ => motion_work_of_store(machine, index),
+        3 => motion_work_of_store(machine, index),
+        _ => motion_work_of_matrices(machine, index),
     }
 }
 
@@ -5675,6 +6186,33 @@ pub(crate) fn motion_work_of_store<M: Machine>(machine: &M, index: u32) {
     machine.store::<u32>(Global::Values, index as usize, loaded_4);
 }
 
+/// `index` is a joint of an instance.
+pub(crate) fn motion_work_of_matrices<M: Machine>(machine: &M, index: u32) {
+    let _block = machine.block(line!(), 16);
+    let loaded = machine.load::<u32>(Global::Dispatch, 6);
+    let loaded_2 = machine.load::<[M::F; 4]>(
+        Global::States,
+        4 * (index.wrapping_mul(STATE_VECTORS).wrapping_add(loaded) as usize),
+    );
+    let loaded_3 = machine.load::<u32>(Global::Dispatch, 8);
+    let rows = matrix_rows(machine, loaded_2, loaded_3);
+    let loaded_4 = machine.load::<u32>(Global::Dispatch, 7);
+    let first = index.wrapping_mul(loaded_4);
+    let result = canonical3(machine, rows.first);
+    store_three(machine, first, result);
+    let result_2 = canonical3(machine, rows.second);
+    store_three(machine, first.wrapping_add(3u32), result_2);
+    let loaded_5 = machine.load::<u32>(Global::Dispatch, 7);
+    if loaded_5 == 9u32 {
+        let _block = machine.block(line!(), 3);
+        let result_3 = canonical3(machine, rows.third);
+        store_three(machine, first.wrapping_add(6u32), result_3);
+        return;
+    } else {
+        return;
+    }
+}
+
 /// Stores the position and the velocity in the parent's frame.
 pub(crate) fn move_joint<M: Machine>(
     machine: &M,
@@ -5829,14 +6367,15 @@ pub(crate) fn moving_span<M: Machine>(
 }
 
 pub(crate) fn near_distance<M: Machine>(machine: &M, at: i32) -> M::F {
-    const OF_KERNELS: [u8; 199] = [
+    const OF_KERNELS: [u8; 220] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1,
+        1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1,
+        1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => near_distance_of_near_frame(machine, at),
@@ -5894,14 +6433,15 @@ pub(crate) fn parameter_in<M: Machine>(machine: &M, span: CrowdSpan<M::F>, tick:
 }
 
 pub(crate) fn parts_1<M: Machine>(machine: &M, rotation: [M::F; 4]) -> [M::F; 3] {
-    const OF_KERNELS: [u8; 199] = [
-        0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 2, 0, 0, 0,
-        0, 0, 1, 0, 2, 0, 0, 0, 0, 0, 1, 0, 2, 0, 0, 0, 0, 0, 1, 0, 2, 0, 0, 0, 0, 0, 1, 0, 0, 0,
-        0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 2, 0, 0, 0, 0, 0, 1, 0,
-        2, 0, 0, 0, 0, 0, 1, 0, 2, 0, 0, 0, 0, 0, 1, 0, 2, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0,
-        0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0,
+    const OF_KERNELS: [u8; 220] = [
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 2,
+        0, 0, 0, 0, 0, 0, 1, 0, 2, 0, 0, 0, 0, 0, 0, 1, 0, 2, 0, 0, 0, 0, 0, 0, 1, 0, 2, 0, 0, 0,
+        0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0,
+        1, 0, 2, 0, 0, 0, 0, 0, 0, 1, 0, 2, 0, 0, 0, 0, 0, 0, 1, 0, 2, 0, 0, 0, 0, 0, 0, 1, 0, 2,
+        0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0,
+        0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0,
+        0, 0, 1, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => parts_1_of_euler(machine, rotation),
@@ -5930,23 +6470,95 @@ pub(crate) fn parts_1_of_euler_2<M: Machine>(machine: &M, rotation: [M::F; 4]) -
     [angles[0], angles[1], angles[2]]
 }
 
-pub(crate) fn parts_2<M: Machine>(machine: &M, rotation: [M::F; 4]) -> [M::F; 9] {
-    const OF_KERNELS: [u8; 199] = [
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1,
-        0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0,
-        0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+pub(crate) fn parts_2<M: Machine>(machine: &M, rotation: [M::F; 4]) -> [M::F; 6] {
+    const OF_KERNELS: [u8; 220] = [
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0,
+        0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0,
+        0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
-        0 => parts_2_of_matrix3x3(machine, rotation),
-        _ => parts_2_of_matrix3x3_2(machine, rotation),
+        0 => parts_2_of_six_d(machine, rotation),
+        _ => parts_2_of_six_d_2(machine, rotation),
     }
 }
 
-pub(crate) fn parts_2_of_matrix3x3<M: Machine>(machine: &M, rotation: [M::F; 4]) -> [M::F; 9] {
+pub(crate) fn parts_2_of_six_d<M: Machine>(machine: &M, rotation: [M::F; 4]) -> [M::F; 6] {
+    let _block = machine.block(line!(), 4);
+    let loaded = machine.load::<u32>(Global::Dispatch, 3);
+    let columns = matrix_rows(machine, rotation, loaded);
+    let first = canonical(
+        machine,
+        [
+            columns.first[0],
+            columns.first[1],
+            columns.first[2],
+            M::F::of(0.0),
+        ],
+    );
+    let second = canonical(
+        machine,
+        [
+            columns.second[0],
+            columns.second[1],
+            columns.second[2],
+            M::F::of(0.0),
+        ],
+    );
+    [
+        first[0], first[1], first[2], second[0], second[1], second[2],
+    ]
+}
+
+pub(crate) fn parts_2_of_six_d_2<M: Machine>(machine: &M, rotation: [M::F; 4]) -> [M::F; 6] {
+    let _block = machine.block(line!(), 4);
+    let loaded = machine.load::<u32>(Global::Dispatch, 0);
+    let columns = matrix_rows(machine, rotation, loaded);
+    let first = canonical(
+        machine,
+        [
+            columns.first[0],
+            columns.first[1],
+            columns.first[2],
+            M::F::of(0.0),
+        ],
+    );
+    let second = canonical(
+        machine,
+        [
+            columns.second[0],
+            columns.second[1],
+            columns.second[2],
+            M::F::of(0.0),
+        ],
+    );
+    [
+        first[0], first[1], first[2], second[0], second[1], second[2],
+    ]
+}
+
+pub(crate) fn parts_3<M: Machine>(machine: &M, rotation: [M::F; 4]) -> [M::F; 9] {
+    const OF_KERNELS: [u8; 220] = [
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0,
+        0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+    ];
+    match OF_KERNELS[machine.code()] {
+        0 => parts_3_of_matrix3x3(machine, rotation),
+        _ => parts_3_of_matrix3x3_2(machine, rotation),
+    }
+}
+
+pub(crate) fn parts_3_of_matrix3x3<M: Machine>(machine: &M, rotation: [M::F; 4]) -> [M::F; 9] {
     let _block = machine.block(line!(), 5);
     let loaded = machine.load::<u32>(Global::Dispatch, 3);
     let rows = matrix_rows(machine, rotation, loaded);
@@ -5972,7 +6584,7 @@ pub(crate) fn parts_2_of_matrix3x3<M: Machine>(machine: &M, rotation: [M::F; 4])
     ]
 }
 
-pub(crate) fn parts_2_of_matrix3x3_2<M: Machine>(machine: &M, rotation: [M::F; 4]) -> [M::F; 9] {
+pub(crate) fn parts_3_of_matrix3x3_2<M: Machine>(machine: &M, rotation: [M::F; 4]) -> [M::F; 9] {
     let _block = machine.block(line!(), 5);
     let loaded = machine.load::<u32>(Global::Dispatch, 0);
     let rows = matrix_rows(machine, rotation, loaded);
@@ -5998,23 +6610,24 @@ pub(crate) fn parts_2_of_matrix3x3_2<M: Machine>(machine: &M, rotation: [M::F; 4
     ]
 }
 
-pub(crate) fn parts_3<M: Machine>(machine: &M, rotation: [M::F; 4]) -> [[M::F; 4]; 3] {
-    const OF_KERNELS: [u8; 199] = [
+pub(crate) fn parts_4<M: Machine>(machine: &M, rotation: [M::F; 4]) -> [[M::F; 4]; 3] {
+    const OF_KERNELS: [u8; 220] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0,
-        0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0,
+        1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0,
+        0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
-        0 => parts_3_of_matrix3x4(machine, rotation),
-        _ => parts_3_of_matrix3x4_2(machine, rotation),
+        0 => parts_4_of_matrix3x4(machine, rotation),
+        _ => parts_4_of_matrix3x4_2(machine, rotation),
     }
 }
 
-pub(crate) fn parts_3_of_matrix3x4<M: Machine>(machine: &M, rotation: [M::F; 4]) -> [[M::F; 4]; 3] {
+pub(crate) fn parts_4_of_matrix3x4<M: Machine>(machine: &M, rotation: [M::F; 4]) -> [[M::F; 4]; 3] {
     let _block = machine.block(line!(), 12);
     let detail = machine.load::<u32>(Global::Dispatch, 3);
     let rows = matrix_rows(machine, rotation, detail);
@@ -6065,7 +6678,7 @@ pub(crate) fn parts_3_of_matrix3x4<M: Machine>(machine: &M, rotation: [M::F; 4])
     ]
 }
 
-pub(crate) fn parts_3_of_matrix3x4_2<M: Machine>(
+pub(crate) fn parts_4_of_matrix3x4_2<M: Machine>(
     machine: &M,
     rotation: [M::F; 4],
 ) -> [[M::F; 4]; 3] {
@@ -6155,14 +6768,15 @@ pub(crate) fn polynomial<M: Machine>(machine: &M, c: [[M::F; 4]; 11], s: M::F) -
 }
 
 pub(crate) fn pose<M: Machine>(machine: &M, sample: u32) {
-    const OF_KERNELS: [u8; 199] = [
+    const OF_KERNELS: [u8; 220] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 2, 3,
-        4, 5, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 2, 3, 4, 5, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => pose_of_add(machine, sample),
@@ -6384,14 +6998,15 @@ pub(crate) fn pose_of_world<M: Machine>(machine: &M, sample: u32) {
 }
 
 pub(crate) fn position_at<M: Machine>(machine: &M, index: u32) -> CrowdPosition<M::F> {
-    const OF_KERNELS: [u8; 199] = [
+    const OF_KERNELS: [u8; 220] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1,
+        1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 2, 2, 2, 2,
+        0, 0, 0, 0, 0, 0, 2, 2, 2, 2,
     ];
     match OF_KERNELS[machine.code()] {
         0 => position_at_of_readers(machine, index),
@@ -6920,14 +7535,15 @@ pub(crate) fn row_product<M: Machine>(
 }
 
 pub(crate) fn sample_at_key_sample<M: Machine>(machine: &M, index: u32) -> KeySample<M::F> {
-    const OF_KERNELS: [u8; 199] = [
+    const OF_KERNELS: [u8; 220] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 1, 1, 1, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => sample_at_key_sample_of_readers(machine, index),
@@ -6962,14 +7578,15 @@ pub(crate) fn sample_at_key_sample_of_readers_2<M: Machine>(
 }
 
 pub(crate) fn sample_at_listed_sample<M: Machine>(machine: &M, index: u32) -> ListedSample<M::F> {
-    const OF_KERNELS: [u8; 199] = [
+    const OF_KERNELS: [u8; 220] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1,
+        1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1,
+        1, 1, 1, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => sample_at_listed_sample_of_readers(machine, index),
@@ -7149,14 +7766,15 @@ pub(crate) fn sampled<M: Machine>(
 }
 
 pub(crate) fn segment_at_arc_segment<M: Machine>(machine: &M, index: u32) -> ArcSegment<M::F> {
-    const OF_KERNELS: [u8; 199] = [
+    const OF_KERNELS: [u8; 220] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
+        1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1,
-        1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
+        1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => segment_at_arc_segment_of_readers(machine, index),
@@ -7192,14 +7810,15 @@ pub(crate) fn segment_at_polynomial_segment<M: Machine>(
     machine: &M,
     index: u32,
 ) -> PolynomialSegment<M::F> {
-    const OF_KERNELS: [u8; 199] = [
+    const OF_KERNELS: [u8; 220] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
+        1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
-        1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
+        1, 1, 1, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => segment_at_polynomial_segment_of_readers(machine, index),
@@ -7754,14 +8373,15 @@ pub(crate) fn step_vector<M: Machine>(machine: &M, a: [M::F; 4], chord: [M::F; 4
 }
 
 pub(crate) fn store<M: Machine>(machine: &M, index: u32, rotation: [M::F; 4]) {
-    const OF_KERNELS: [u8; 199] = [
-        0, 0, 1, 2, 3, 4, 5, 6, 1, 0, 1, 2, 3, 4, 5, 6, 1, 0, 1, 2, 3, 4, 5, 6, 1, 0, 1, 2, 3, 4,
-        5, 6, 1, 0, 1, 2, 3, 4, 5, 6, 1, 0, 1, 2, 3, 4, 5, 6, 1, 0, 1, 2, 3, 4, 5, 6, 1, 0, 1, 2,
-        3, 4, 5, 6, 1, 0, 1, 2, 3, 4, 5, 6, 1, 0, 1, 2, 3, 4, 5, 6, 1, 0, 1, 2, 3, 4, 5, 6, 1, 0,
-        1, 2, 3, 4, 5, 6, 1, 0, 1, 2, 3, 4, 5, 6, 1, 0, 1, 2, 3, 4, 5, 6, 1, 3, 3, 3, 0, 0, 0, 0,
-        0, 0, 3, 3, 3, 3, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 3, 2, 0, 0, 0, 0, 0, 0, 1, 2, 7, 4, 5,
-        6, 1, 0, 1, 2, 7, 4, 5, 6, 1, 0, 1, 2, 7, 4, 5, 6, 1, 0, 1, 2, 7, 4, 5, 6, 1, 0, 1, 2, 7,
-        4, 5, 6, 1, 0, 1, 2, 7, 4, 5, 6, 1, 7, 7, 7, 7, 7, 7, 7,
+    const OF_KERNELS: [u8; 220] = [
+        0, 0, 1, 2, 3, 4, 5, 6, 7, 1, 0, 1, 2, 3, 4, 5, 6, 7, 1, 0, 1, 2, 3, 4, 5, 6, 7, 1, 0, 1,
+        2, 3, 4, 5, 6, 7, 1, 0, 1, 2, 3, 4, 5, 6, 7, 1, 0, 1, 2, 3, 4, 5, 6, 7, 1, 0, 1, 2, 3, 4,
+        5, 6, 7, 1, 0, 1, 2, 3, 4, 5, 6, 7, 1, 0, 1, 2, 3, 4, 5, 6, 7, 1, 0, 1, 2, 3, 4, 5, 6, 7,
+        1, 0, 1, 2, 3, 4, 5, 6, 7, 1, 0, 1, 2, 3, 4, 5, 6, 7, 1, 0, 1, 2, 3, 4, 5, 6, 7, 1, 0, 1,
+        2, 3, 4, 5, 6, 7, 1, 3, 3, 3, 0, 0, 0, 0, 0, 0, 3, 3, 3, 3, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 3, 2, 0, 0, 0, 0, 0, 0, 0, 1, 2, 8, 4, 5, 6, 7, 1, 0, 1, 2, 8, 4, 5, 6, 7, 1, 0, 1, 2,
+        8, 4, 5, 6, 7, 1, 0, 1, 2, 8, 4, 5, 6, 7, 1, 0, 1, 2, 8, 4, 5, 6, 7, 1, 0, 1, 2, 8, 4, 5,
+        6, 7, 1, 8, 8, 8, 8, 8, 8, 8,
     ];
     match OF_KERNELS[machine.code()] {
         0 => store_of_axis_angle(machine, index, rotation),
@@ -7770,7 +8390,8 @@ pub(crate) fn store<M: Machine>(machine: &M, index: u32, rotation: [M::F; 4]) {
         3 => store_of_f32(machine, index, rotation),
         4 => store_of_matrix3x3(machine, index, rotation),
         5 => store_of_matrix3x4(machine, index, rotation),
-        6 => store_of_snorm16(machine, index, rotation),
+        6 => store_of_six_d(machine, index, rotation),
+        7 => store_of_snorm16(machine, index, rotation),
         _ => store_of_f32_2(machine, index, rotation),
     }
 }
@@ -7826,7 +8447,7 @@ pub(crate) fn store_of_matrix3x3<M: Machine>(machine: &M, index: u32, rotation: 
     let mut all: [M::F; 9] = Default::default();
     let mut part: u32 = 0u32;
     let _block = machine.block(line!(), 2);
-    let result = parts_2(machine, rotation);
+    let result = parts_3(machine, rotation);
     all = result;
     loop {
         let _block = machine.block(line!(), 12);
@@ -7851,7 +8472,7 @@ pub(crate) fn store_of_matrix3x4<M: Machine>(machine: &M, index: u32, rotation: 
     let mut all: [[M::F; 4]; 3] = Default::default();
     let mut part: u32 = 0u32;
     let _block = machine.block(line!(), 2);
-    let result = parts_3(machine, rotation);
+    let result = parts_4(machine, rotation);
     all = result;
     loop {
         let _block = machine.block(line!(), 12);
@@ -7865,6 +8486,31 @@ pub(crate) fn store_of_matrix3x4<M: Machine>(machine: &M, index: u32, rotation: 
         machine.store::<[M::F; 4]>(
             Global::Rotations,
             4 * (index.wrapping_mul(3u32).wrapping_add(loaded_2) as usize),
+            loaded_4,
+        );
+        let loaded_5 = part;
+        part = loaded_5.wrapping_add(1u32);
+    }
+}
+
+pub(crate) fn store_of_six_d<M: Machine>(machine: &M, index: u32, rotation: [M::F; 4]) {
+    let mut all: [M::F; 6] = Default::default();
+    let mut part: u32 = 0u32;
+    let _block = machine.block(line!(), 2);
+    let result = parts_2(machine, rotation);
+    all = result;
+    loop {
+        let _block = machine.block(line!(), 12);
+        let loaded = part;
+        if !(loaded < 6u32) {
+            break;
+        }
+        let loaded_2 = part;
+        let loaded_3 = part;
+        let loaded_4 = all[loaded_3 as usize];
+        machine.store::<M::F>(
+            Global::Rotations,
+            index.wrapping_mul(6u32).wrapping_add(loaded_2) as usize,
             loaded_4,
         );
         let loaded_5 = part;
@@ -7891,6 +8537,21 @@ pub(crate) fn store_of_f32_2<M: Machine>(machine: &M, index: u32, rotation: [M::
     machine.store::<[u64; 2]>(Global::Rotations, 4 * (index as usize), result);
 }
 
+pub(crate) fn store_three<M: Machine>(machine: &M, first: u32, numbers: [M::F; 4]) {
+    let _block = machine.block(line!(), 5);
+    machine.store::<M::F>(Global::Values, first as usize, numbers[0]);
+    machine.store::<M::F>(
+        Global::Values,
+        first.wrapping_add(1u32) as usize,
+        numbers[1],
+    );
+    machine.store::<M::F>(
+        Global::Values,
+        first.wrapping_add(2u32) as usize,
+        numbers[2],
+    );
+}
+
 pub(crate) fn store_with_care<M: Machine>(
     machine: &M,
     item: SpreadRun<M::F>,
@@ -7898,14 +8559,15 @@ pub(crate) fn store_with_care<M: Machine>(
     first_j: u32,
     repetition: u32,
 ) {
-    const OF_KERNELS: [u8; 199] = [
+    const OF_KERNELS: [u8; 220] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 1, 0, 1, 1, 0, 0, 1, 0, 1, 0, 1, 1, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 1, 1, 0, 0, 0, 1, 0, 1, 0,
+        1, 1, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => store_with_care_of_alone(machine, item, location, first_j, repetition),
@@ -8076,14 +8738,15 @@ pub(crate) fn store_with_care_of_alone_2<M: Machine>(
 }
 
 pub(crate) fn tick_of<M: Machine>(machine: &M, entry: CrowdEntry, period: u32) -> u32 {
-    const OF_KERNELS: [u8; 199] = [
+    const OF_KERNELS: [u8; 220] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => tick_of_of_ticks(machine, entry, period),
@@ -8526,14 +9189,15 @@ pub(crate) fn walk<M: Machine>(machine: &M, instance: u32, link: CrowdLink) {
 }
 
 pub(crate) fn weights_at<M: Machine>(machine: &M, index: u32) -> TangentWeights<M::F> {
-    const OF_KERNELS: [u8; 199] = [
+    const OF_KERNELS: [u8; 220] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 1, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => weights_at_of_readers(machine, index),

@@ -1,10 +1,7 @@
 //! The curve of one channel of a clip, before it is stored in the tables of a library.
 
-use bytemuck::Zeroable as _;
-
 use crate::shader::{
-    CrowdSpan, FORM_ARC, FORM_CONSTANT, FORM_CUBIC, FORM_KEYS, FORM_LINE, FORM_PACKED, ON_KEY,
-    POWERS,
+    CrowdSpan, FORM_ARC, FORM_CONSTANT, FORM_CUBIC, FORM_KEYS, FORM_LINE, FORM_PACKED, POWERS,
 };
 use crate::simd::lanes::{Lanes, MAX_LANES};
 use crate::twin::arc_between::arc_between;
@@ -40,36 +37,11 @@ impl ChannelCurve {
         }
     }
 
-    /// Adds a span in which the value is constant: the first constant is the value, the others are 0.
-    pub(crate) fn push_constant(&mut self, start: u32, value: [f32; 4], key: Option<[f32; 4]>) {
-        let span = CrowdSpan {
-            start,
-            whole: start as i32,
-            ..CrowdSpan::zeroed()
-        };
-        let mut constants = [[0.0; 4]; POWERS];
-        constants[0] = value;
-        self.push(span, &constants, key);
-    }
-
-    /// Adds a span with the first of the constants, as many as the form has.
-    pub(crate) fn push(
-        &mut self,
-        span: CrowdSpan,
-        constants: &[[f32; 4]; POWERS],
-        key: Option<[f32; 4]>,
-    ) {
+    /// Adds a span with its constants, as many as the form has.
+    pub(crate) fn push(&mut self, span: CrowdSpan, constants: &[[f32; 4]], key: Option<[f32; 4]>) {
         self.spans.push(span);
-        self.constants
-            .extend_from_slice(&constants[..constants_of(self.form)]);
+        self.constants.extend_from_slice(constants);
         self.keys.push(key.unwrap_or_default());
-    }
-
-    /// Marks the last span: its key lies on its first tick.
-    pub(crate) fn mark_on_key(&mut self) {
-        if let Some(span) = self.spans.last_mut() {
-            span.start |= ON_KEY;
-        }
     }
 
     /// The constants of a span.

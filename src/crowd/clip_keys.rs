@@ -75,6 +75,14 @@ fn exact_keys(curve: &ChannelCurve) -> Option<(u32, Vec<[f32; 4]>)> {
     (0..keys.len()).all(is_arc).then_some((FORM_KEYS, keys))
 }
 
+/// Packs a curve of keys.
+pub(crate) fn pack_keys(curve: &mut ChannelCurve) {
+    curve.form = FORM_PACKED;
+    for key in &mut curve.constants {
+        *key = packed(*key);
+    }
+}
+
 /// Packed keys, if each arc begins where the one before ends.
 fn packed_keys(curve: &ChannelCurve) -> Option<(u32, Vec<[f32; 4]>)> {
     let mut keys = starts(curve);

@@ -6,19 +6,23 @@ use std::ops::Range;
 use bytemuck::Zeroable as _;
 use glam::Vec3;
 
-use crate::crowd::channel_curve::ChannelCurve;
-use crate::crowd::clip_keys::{KeyPrecision, keeps_keys, keys_of, pack};
+use crate::crowd::channel_curve::{ChannelCurve, constants_of};
+use crate::crowd::clip_keys::{KeyPrecision, keeps_keys, keys_of, pack, pack_keys};
 use crate::crowd_error::{CrowdError, MAX_TICKS};
-use crate::curve::options::Quantity;
+use crate::curve::options::{KeySigns, Quantity, Speed};
 use crate::math::canonical::round_f32;
 use crate::memory::reserved;
 use crate::method::interpolation::Interpolation;
 use crate::method::vector_method::{ScalarQuantity, VectorMethod};
+use crate::prepare::arcs::arc_at;
 use crate::prepare::clip_data::{ClipData, PrepareRequest};
+use crate::prepare::preparation::Batch;
+use crate::prepare::prepared::Prepared;
 use crate::prepare::vectors::VectorRequest;
 use crate::shader::{
-    CHANNELS, CrowdBase, CrowdChannel, CrowdClip, CrowdSpan, FORM_ARC, FORM_CONSTANT, FORM_CUBIC,
-    FORM_PACKED, FORM_POLYNOMIAL, Form, ON_KEY, POWERS, SCALE,
+    CHANNELS, CrowdBase, CrowdChannel, CrowdClip, CrowdSpan, END_NEGATED, FORM_ARC, FORM_CONSTANT,
+    FORM_CUBIC, FORM_KEYS, FORM_PACKED, FORM_POLYNOMIAL, Form, KEY_OF_INTERVAL, ON_KEY, POWERS,
+    SCALE, START_NEGATED,
 };
 use crate::simd::lanes::{Lanes, MAX_LANES, canonical};
 use crate::time::frame_clock::{FrameClock, FrameStart, TrackCopy, in_frames};
@@ -28,6 +32,7 @@ use crate::time::spans::SpanSource;
 use crate::time::wrap::WrapMode;
 use crate::tracks::set::TrackSet;
 use crate::tracks::set::vectors::Channel;
+use crate::twin::arc_between::arc_between;
 use crate::twin::crowd_layers::sampled;
 use crate::twin::crowd_times::position_at;
 use crate::twin::evaluate_arc::{norm_squared, on_arc};
@@ -53,20 +58,26 @@ pub(crate) struct ClipTables {
     pub(crate) keys: Option<KeyPrecision>,
 }
 
-/// The curve of one track as for evaluation at frames: a frame is a tick, and the clip has `period` of them from its
-/// start.
-fn curve(
-    data: &ClipData,
+/// The source of a span's values.
+#[derive(Clone, Copy)]
+enum SpanValues<'a> {
+    /// A segment of a group, by its index.
+    Segment(&'a Prepared, u32),
+    /// The same value everywhere.
+    Constant([f32; 4]),
+}
+
+/// Calls `push` for each span of a track that has a tick, as for evaluation at frames: a frame is a tick, and the clip has
+/// `period` of them from its start. It gets the span, its values, and the key at its start if there is one.
+fn each_span<'d>(
+    data: &'d ClipData,
     track: usize,
-    form: u32,
     (rate, start, period): (FrameRate, FrameStart, u32),
-) -> Result<ChannelCurve, CrowdError> {
-    let mut curve = ChannelCurve {
-        form,
-        ..ChannelCurve::default()
-    };
+    mut push: impl FnMut(CrowdSpan, SpanValues<'d>, Option<[f32; 4]>),
+) -> Result<(), CrowdError> {
     let whole = TrackCopy::of_track(0..0);
     let last_tick = f64::from(period);
+    let mut is_first = true;
     for part_ref in data.parts_in(track, &whole) {
         let (prepared, part) = (part_ref.prepared, part_ref.part);
         let frames = FrameClock::new(rate, start, prepared.spans.steps);
@@ -74,69 +85,200 @@ fn curve(
         let starts = &prepared.spans.starts[part.spans.clone()];
         let begin = frames.boundary(*starts.first().unwrap_or(&part.end));
         if part.before != NONE && begin.first > 0.0 {
-            curve.push_constant(0, constant(part.before), None);
+            push(still(0), SpanValues::Constant(constant(part.before)), None);
+            is_first = false;
         }
         let ends = starts.iter().skip(1).chain([&part.end]);
-        for ((index, &span_start), &end) in part.spans.clone().zip(starts).zip(ends) {
-            let (from, to) = (frames.boundary(span_start), frames.boundary(end));
-            if from.first >= to.first || from.first > last_tick {
+        let mut from = begin;
+        for (index, &end) in part.spans.clone().zip(ends) {
+            let start = from;
+            let to = frames.boundary(end);
+            from = to;
+            if start.first >= to.first || start.first > last_tick {
                 continue; // no tick lies in it
             }
-            let first = from.first as u32;
+            let first = start.first as u32;
             let key = prepared.spans.keys[index];
-            let is_on_key = key != NONE && from.first == from.frame;
+            let is_on_key = key != NONE && start.first == start.frame;
             let key = (key != NONE).then(|| constant(key));
-            match prepared.spans.source(index) {
+            let (span, values) = match prepared.spans.source(index) {
                 SpanSource::Segment(index) => {
-                    let along = in_frames(from.frame, to.frame, 1.0);
+                    let along = in_frames(start.frame, to.frame, 1.0);
                     let span = CrowdSpan {
                         start: first,
                         whole: along.whole as i32,
                         scale: along.scale,
                         offset: along.offset,
                     };
-                    // The constants, ordered by power.
-                    let constants = match (form, index as usize) {
-                        (FORM_ARC, index) => {
-                            let arc = &prepared.segments.arcs[index];
-                            let mut constants = [[0.0; 4]; POWERS];
-                            [constants[0], constants[1]] = [arc.middle, arc.tangent];
-                            constants
-                        }
-                        (_, index) => prepared.segments.polynomials[index].coefficients,
-                    };
-                    curve.push(span, &constants, key);
+                    (span, SpanValues::Segment(prepared, index))
                 }
-                SpanSource::Constant(index) => curve.push_constant(first, constant(index), key),
+                SpanSource::Constant(index) => {
+                    (still(first), SpanValues::Constant(constant(index)))
+                }
                 SpanSource::Exact(_) => {
                     return Err(CrowdError::TooWild {
                         track,
-                        seconds: span_start,
+                        seconds: prepared.spans.starts[index],
                     });
                 }
-            }
-            if is_on_key {
-                curve.mark_on_key();
-            }
+            };
+            push(marked(span, is_on_key), values, key);
+            is_first = false;
         }
         let end = frames.boundary(part.end);
-        if part.after != NONE && (end.first <= last_tick || curve.spans.is_empty()) {
+        if part.after != NONE && (end.first <= last_tick || is_first) {
             let at_end = part.extension.as_ref().map(|extension| extension.at_end);
             let key = at_end.filter(|&key| key != NONE);
             let first = end.first.min(last_tick) as u32;
-            let first = if curve.spans.is_empty() { 0 } else { first };
-            curve.push_constant(first, constant(part.after), key.map(constant));
-            if key.is_some() && end.first == end.frame {
-                curve.mark_on_key();
-            }
+            let span = still(if is_first { 0 } else { first });
+            let is_on_key = key.is_some() && end.first == end.frame;
+            let value = SpanValues::Constant(constant(part.after));
+            push(marked(span, is_on_key), value, key.map(constant));
+            is_first = false;
         }
     }
+    Ok(())
+}
+
+/// A span in which the value is constant.
+fn still(start: u32) -> CrowdSpan {
+    CrowdSpan {
+        start,
+        whole: start as i32,
+        ..CrowdSpan::zeroed()
+    }
+}
+
+/// A span with the mark that its key lies on its first tick, if it does.
+fn marked(span: CrowdSpan, is_on_key: bool) -> CrowdSpan {
+    CrowdSpan {
+        start: span.start | if is_on_key { ON_KEY } else { 0 },
+        ..span
+    }
+}
+
+/// The curve of one track, with the constants of each span.
+fn curve(
+    data: &ClipData,
+    track: usize,
+    form: u32,
+    clock: (FrameRate, FrameStart, u32),
+) -> Result<ChannelCurve, CrowdError> {
+    let mut curve = ChannelCurve {
+        form,
+        ..ChannelCurve::default()
+    };
+    each_span(data, track, clock, |span, values, key| match values {
+        SpanValues::Constant(value) => {
+            let mut constants = [[0.0; 4]; POWERS];
+            constants[0] = value;
+            curve.push(span, &constants[..constants_of(form)], key);
+        }
+        SpanValues::Segment(prepared, index) if form == FORM_ARC => {
+            let arc = arc_at(prepared, index);
+            curve.push(span, &[arc.middle, arc.tangent], key);
+        }
+        // The constants are ordered by power.
+        SpanValues::Segment(prepared, index) => {
+            let segment = &prepared.segments.polynomials[index as usize];
+            curve.push(span, &segment.coefficients[..constants_of(form)], key);
+        }
+    })?;
     let is_still = curve.spans.len() == 1 && curve.spans[0].scale == 0.0;
     Ok(match curve.constants.first() {
         Some(&value) if is_still && curve.spans[0].start & ON_KEY == 0 => {
             ChannelCurve::constant(value)
         }
         _ => curve,
+    })
+}
+
+/// A curve as its keys, if these determine it.
+fn of_keys(curve: ChannelCurve, precision: KeyPrecision) -> ChannelCurve {
+    match keys_of(&curve, precision) {
+        Some((form, constants)) => ChannelCurve {
+            form,
+            constants,
+            ..curve
+        },
+        None => curve,
+    }
+}
+
+/// The curve of the only track, whose arcs are listed, as its keys; `None` if these do not determine it: some arc does not
+/// lie between the keys as they are stored, or is not followed by the one that begins where it ends.
+fn curve_of_keys(
+    data: &ClipData,
+    clock: (FrameRate, FrameStart, u32),
+) -> Result<Option<ChannelCurve>, CrowdError> {
+    let mut curve = ChannelCurve {
+        form: FORM_KEYS,
+        ..ChannelCurve::default()
+    };
+    let are_listed = |group: &Prepared| group.segments.are_arcs_listed;
+    if !data.groups.iter().all(are_listed) {
+        return Ok(None);
+    }
+    let whole = TrackCopy::of_track(0..0);
+    let parts = data.parts_in(0, &whole);
+    let most = parts.map(|it| it.part.spans.len() + 2).sum();
+    curve.spans.reserve(most);
+    curve.constants.reserve(most);
+    let mut are_keys = true;
+    // The key at the end of the span before.
+    let mut end: Option<[f32; 4]> = None;
+    each_span(data, 0, clock, |span, values, key| {
+        let value = match values {
+            SpanValues::Constant(value) if span.start & ON_KEY == 0 => value,
+            _ => key.unwrap_or_default(),
+        };
+        let is_same =
+            |key: [f32; 4], other: [f32; 4]| key.map(f32::to_bits) == other.map(f32::to_bits);
+        are_keys &= end.is_none_or(|end| is_same(end, value));
+        end = Some(match values {
+            SpanValues::Constant(constant) => {
+                let (middle, tangent) = arc_between(value, value);
+                are_keys &= [middle, tangent] == [constant, [0.0; 4]];
+                value
+            }
+            SpanValues::Segment(prepared, index) => {
+                let interval = prepared.segments.intervals[index as usize];
+                let key = (interval & KEY_OF_INTERVAL) as usize;
+                let is_as_stored = interval & (START_NEGATED | END_NEGATED) == 0;
+                are_keys &= is_as_stored && is_same(prepared.constants[key], value);
+                prepared.constants[key + 1]
+            }
+        });
+        curve.spans.push(span);
+        curve.constants.push(value);
+    })?;
+    let is_still = curve.spans.len() < 2;
+    Ok((are_keys && !is_still).then_some(curve))
+}
+
+/// The curve of a track as its keys, if it has the times of the track before, whose curve consists of all of its keys. The
+/// spans are then the same.
+fn keys_at_same_times(
+    set: &TrackSet,
+    (before, curve): (usize, &ChannelCurve),
+    track: usize,
+) -> Option<ChannelCurve> {
+    let (times, keys) = set.times_and_keys(track);
+    let keys: &[[f32; 4]] = bytemuck::cast_slice(keys);
+    let (last, arcs) = curve.spans.split_last()?;
+    let is_whole = matches!(curve.form, FORM_KEYS | FORM_PACKED)
+        && curve.spans.len() == keys.len()
+        && last.scale == 0.0
+        && arcs.iter().all(|span| span.scale != 0.0);
+    let end = *keys.last()?;
+    let is_same = std::ptr::eq(times, set.times_and_keys(before).0)
+        && !set.signs(track).between(0..keys.len()).any()
+        && arc_between(end, end) == (end, [0.0; 4]);
+    (is_whole && is_same).then(|| ChannelCurve {
+        form: FORM_KEYS,
+        spans: curve.spans.clone(),
+        constants: keys.to_vec(),
+        keys: Vec::new(),
     })
 }
 
@@ -167,7 +309,6 @@ impl ClipTables {
         }
         let period = (ticks as u32).max(1);
         let clock = (rate, FrameStart::new(start), period);
-        let rotations = ClipData::new(set, interpolation, PrepareRequest::all(set))?;
         let form = match interpolation.form() {
             Form::Arc => FORM_ARC,
             Form::Polynomial => FORM_POLYNOMIAL,
@@ -182,8 +323,9 @@ impl ClipTables {
         let translations = ClipData::of_vectors(set, Channel::Translation, &of_vectors)?;
         let scales = ClipData::of_vectors(set, Channel::Scale, &of_vectors)?;
         let mut curves = reserved(joints * CHANNELS as usize, "a clip of a crowd")?;
-        for (joint, offset) in offsets.iter().enumerate() {
-            curves.push(curve(&rotations, joint, form, clock)?);
+        let rotations = self.rotation_curves(set, interpolation, form, clock)?;
+        for ((joint, offset), rotations) in offsets.iter().enumerate().zip(rotations) {
+            curves.push(rotations);
             curves.push(match set.vectors(Channel::Translation, joint) {
                 Some(_) => curve(&translations, joint, FORM_CUBIC, clock)?,
                 None => ChannelCurve::constant([offset.x, offset.y, offset.z, 0.0]),
@@ -191,7 +333,9 @@ impl ClipTables {
             curves.push(curve(&scales, joint, FORM_CUBIC, clock)?);
         }
         if let Some(precision) = self.keys {
-            for curve in &mut curves {
+            // Rotations have been stored as keys already.
+            let curves = curves.iter_mut().enumerate();
+            for (_, curve) in curves.filter(|(index, _)| index % CHANNELS as usize != 0) {
                 if let Some((form, keys)) = keys_of(curve, precision) {
                     (curve.form, curve.constants) = (form, keys);
                 }
@@ -207,6 +351,57 @@ impl ClipTables {
         self.check_room([more, spans + 1, curves.len()])?;
         self.add(period, &curves);
         Ok(())
+    }
+
+    /// The curves of the rotations of all joints: their keys where they are enough.
+    fn rotation_curves(
+        &self,
+        set: &TrackSet,
+        interpolation: Interpolation,
+        form: u32,
+        clock: (FrameRate, FrameStart, u32),
+    ) -> Result<Vec<ChannelCurve>, CrowdError> {
+        let joints = 0..set.track_count();
+        // Where keys are enough, no arc is computed.
+        let are_from_keys = form == FORM_ARC
+            && interpolation.signs == KeySigns::Shortest
+            && interpolation.speed == Speed::AsKeyed;
+        let Some(precision) = self.keys.filter(|_| are_from_keys) else {
+            let data = ClipData::new(set, interpolation, PrepareRequest::all(set))?;
+            let curves = joints.map(|joint| {
+                let curve = curve(&data, joint, form, clock)?;
+                Ok(match self.keys {
+                    Some(precision) => of_keys(curve, precision),
+                    None => curve,
+                })
+            });
+            return curves.collect();
+        };
+        let mut curves: Vec<ChannelCurve> = Vec::with_capacity(joints.len());
+        for joint in joints {
+            let before = joint.checked_sub(1).map(|before| (before, &curves[before]));
+            let shared = before.and_then(|before| keys_at_same_times(set, before, joint));
+            let mut curve = match shared {
+                Some(curve) => curve,
+                None => {
+                    let request = PrepareRequest {
+                        batch: Batch::Tracks(joint..joint + 1),
+                        lists_arcs: true,
+                        ..PrepareRequest::all(set)
+                    };
+                    let data = ClipData::new(set, interpolation, request)?;
+                    match curve_of_keys(&data, clock)? {
+                        Some(curve) => curve,
+                        None => of_keys(curve(&data, 0, form, clock)?, precision),
+                    }
+                }
+            };
+            if curve.form == FORM_KEYS && precision == KeyPrecision::Packed {
+                pack_keys(&mut curve);
+            }
+            curves.push(curve);
+        }
+        Ok(curves)
     }
 
     /// Refuses more cells, spans and channels than the tables can have.

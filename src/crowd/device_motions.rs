@@ -9,6 +9,7 @@ use crate::engine::Engine;
 use crate::gpu::external::ExportedResult;
 use crate::gpu::motion::{MappedStates, MotionSource, ResidentMotions, StateSteps, StatesRequest};
 use crate::machine::error::EvaluateError;
+use crate::output::encoding::Encoding;
 use crate::output::states::StateArray;
 use crate::shader::MotionSample;
 
@@ -19,7 +20,7 @@ use crate::shader::MotionSample;
 /// ```
 /// use tumble::glam::{Quat, Vec3};
 /// use tumble::crowd::{DeviceMotions, KeyPrecision, MotionBuilder, StateArray};
-/// use tumble::{Device, Engine, Skeleton, TrackSet, VectorMethod, method};
+/// use tumble::{Device, Encoding, Engine, Skeleton, TrackSet, VectorMethod, method};
 /// let mut door = TrackSet::new();
 /// door.push("door", &[0.0, 2.0], &[Quat::IDENTITY, Quat::from_rotation_y(1.0)])?;
 /// let skeleton = Skeleton::new(vec![None], vec![Vec3::X])?;
@@ -29,9 +30,11 @@ use crate::shader::MotionSample;
 ///
 /// for device in Device::list()? {
 ///     let motions = DeviceMotions::new(&Engine::new(device)?, &tables, (&spans, &cells))?;
-///     let (states, ranges) = motions.sample(&[(0, 705_600)], None, &[StateArray::AngularVelocities])?;
-///     let velocity: &[f32] = tumble::bytemuck::cast_slice(&states.bytes()[ranges[0].clone()]);
-///     assert!((velocity[1] - 0.5).abs() < 1e-6);
+///     let arrays = [StateArray::AngularVelocities, StateArray::Rotations];
+///     let (states, ranges) = motions.sample(&[(0, 705_600)], None, &arrays, Encoding::SixD)?;
+///     let numbers = |array: usize| tumble::bytemuck::cast_slice::<u8, f32>(&states.bytes()[ranges[array].clone()]);
+///     assert!((numbers(0)[1] - 0.5).abs() < 1e-6);
+///     assert!((numbers(1)[0] - 0.5_f32.cos()).abs() < 1e-6);
 /// }
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
@@ -82,20 +85,23 @@ impl DeviceMotions {
     /// directly into this memory; from other devices the result is copied.
     ///
     /// `at` has a clip and a tick for each instance, as for [`MotionTables::sample_into`]; with `steps`, velocities are
-    /// differences, as for [`MotionTables::differences_into`]. Also returned are the ranges of the arrays in the
+    /// differences, as for [`MotionTables::differences_into`]. `rotations` is the encoding of both arrays of rotations:
+    /// [`Encoding::F32`], [`Encoding::Matrix3x3`] or [`Encoding::SixD`]. Also returned are the ranges of the arrays in the
     /// memory, in bytes; each array is `[instance][joint][number]`, f32.
     ///
     /// # Errors
-    /// When a clip does not exist, there are more or fewer steps than instances, there is not enough memory, the device
-    /// fails, or the work is stopped.
+    /// When a clip does not exist, there are more or fewer steps than instances, the encoding is another one, there is not
+    /// enough memory, the device fails, or the work is stopped.
     pub fn sample(
         &self,
         at: &[(u32, u32)],
         steps: Option<&[FrameStep]>,
         arrays: &[StateArray],
+        rotations: Encoding,
     ) -> Result<(MappedStates, Vec<Range<usize>>), CrowdError> {
-        let (states, ranges) =
-            self.with_request(at, steps, arrays, |request| self.resident.evaluate(request))?;
+        let (states, ranges) = self.with_request((at, steps), (arrays, rotations), |request| {
+            self.resident.evaluate(request)
+        })?;
         Ok((states, ranges.into_iter().map(in_memory).collect()))
     }
 
@@ -110,20 +116,29 @@ impl DeviceMotions {
         at: &[(u32, u32)],
         steps: Option<&[FrameStep]>,
         arrays: &[StateArray],
+        rotations: Encoding,
     ) -> Result<(ExportedResult, Vec<Range<usize>>), CrowdError> {
-        let (states, ranges) =
-            self.with_request(at, steps, arrays, |request| self.resident.export(request))?;
+        let (states, ranges) = self.with_request((at, steps), (arrays, rotations), |request| {
+            self.resident.export(request)
+        })?;
         Ok((states, ranges.into_iter().map(in_memory).collect()))
     }
 
     fn with_request<T>(
         &self,
-        at: &[(u32, u32)],
-        steps: Option<&[FrameStep]>,
-        arrays: &[StateArray],
+        (at, steps): (&[(u32, u32)], Option<&[FrameStep]>),
+        (arrays, rotations): (&[StateArray], Encoding),
         work: impl FnOnce(&StatesRequest<'_>) -> Result<T, EvaluateError>,
     ) -> Result<T, CrowdError> {
         check_clips(self.clips, at)?;
+        if !matches!(
+            rotations,
+            Encoding::F32 | Encoding::Matrix3x3(_) | Encoding::SixD
+        ) {
+            return Err(CrowdError::StateEncoding {
+                encoding: rotations,
+            });
+        }
         let sample = |&(clip, tick): &(u32, u32)| MotionSample { clip, tick };
         let samples: Vec<MotionSample> = at.iter().map(sample).collect();
         let steps = match steps {
@@ -145,6 +160,7 @@ impl DeviceMotions {
             at: &samples,
             steps,
             arrays,
+            rotations,
         };
         work(&request).map_err(|error| match error {
             EvaluateError::Vulkan(error) | EvaluateError::NoRoom(error) => error.into(),

@@ -523,37 +523,41 @@ impl MotionBuilder {
         self.0.push_tables(set, interpolation.into(), vectors)
     }
 
-    /// Adds clips in this order, which are prepared on the threads of `engine`.
+    /// Adds so many clips in this order, which are made by `clip` and prepared on the threads of `engine`. Each is dropped as
+    /// soon as it is prepared.
     ///
     /// # Errors
-    /// The index of a clip and why it is not added, as [`MotionBuilder::push`]; clips before it are added. When the
-    /// system refuses threads or the work is stopped, the index is that of the next clip.
-    pub fn push_all(
+    /// The index of a clip and why it is not added, which is the error of `clip` or as [`MotionBuilder::push`]; clips before
+    /// it are added. When the system refuses threads or the work is stopped, the index is that of the next clip.
+    pub fn push_all<'a, E: From<CrowdError> + Send>(
         &mut self,
         engine: &Engine,
-        clips: &[MotionClip<'_>],
-    ) -> Result<(), (usize, CrowdError)> {
+        count: usize,
+        clip: impl Fn(usize) -> Result<MotionClip<'a>, E> + Sync,
+    ) -> Result<(), (usize, E)> {
+        let mut next = 0;
         // The first clip may name the joints, so it is added before the others.
-        if let Some(first) = clips.first() {
-            (self.0.push_clip(first)).map_err(|error| (0, error))?;
+        if self.0.clip_count() == 0 && count > 0 {
+            let added = clip(0).and_then(|first| Ok(self.0.push_clip(&first)?));
+            added.map_err(|error| (0, error))?;
+            next = 1;
         }
         let stop = stop::current();
-        let mut next = 1;
-        while next < clips.len() {
-            let batch = next..clips.len().min(next + CLIPS_AT_ONCE);
-            let prepared = |index: usize| -> Result<ClipTables, CrowdError> {
-                stop::check_of(stop.as_ref())?;
+        while next < count {
+            let batch = next..count.min(next + CLIPS_AT_ONCE);
+            let prepared = |index: usize| -> Result<ClipTables, E> {
+                stop::check_of(stop.as_ref()).map_err(CrowdError::from)?;
                 let mut part = self.0.clone_without_tables();
-                part.push_clip(&clips[index])?;
+                part.push_clip(&clip(index)?)?;
                 Ok(part.tables)
             };
-            let work = || -> Vec<Result<ClipTables, CrowdError>> {
+            let work = || -> Vec<Result<ClipTables, E>> {
                 batch.clone().into_par_iter().map(prepared).collect()
             };
             let parts = engine.machine.threads().run(work);
-            let parts = parts.map_err(|error| (next, error.into()))?;
+            let parts = parts.map_err(|error| (next, CrowdError::from(error).into()))?;
             for part in parts {
-                let added = part.and_then(|part| self.0.tables.append(part));
+                let added = part.and_then(|part| Ok(self.0.tables.append(part)?));
                 added.map_err(|error| (next, error))?;
                 next += 1;
             }

@@ -21,7 +21,7 @@ use crate::shader::{
     TICKS, TRANSLATION,
 };
 use crate::simd::dispatch::{InLanes, in_lanes_of};
-use crate::simd::lanes::Lanes;
+use crate::simd::lanes::{Lanes, Number};
 use crate::threads::stop;
 use crate::twin::arc_tangent::{arc_tangent, flushed, reciprocal, root};
 use crate::twin::crowd_layers::sampled;
@@ -31,8 +31,11 @@ use crate::twin::quaternion::rotated;
 /// The number of instances in a task.
 const TASK: usize = 64;
 
-/// The number of spans that are tried before they are searched.
-const GUESSES: usize = 6;
+/// The number of guesses before spans are searched.
+const GUESSES: usize = 4;
+
+/// The number of spans around a guess that are compared together.
+const NEIGHBOURS: usize = 16;
 
 /// Output arrays for the poses and velocities of all joints, `[instance][joint]`. Arrays that are empty are not
 /// computed. Units are seconds, radians, and the unit of length of the clips.
@@ -340,6 +343,16 @@ impl MotionTables {
         self.joints
     }
 
+    /// The parent of each joint; `None` for roots.
+    #[must_use]
+    pub fn parents(&self) -> Vec<Option<usize>> {
+        let mut parents = vec![None; self.joints];
+        for link in &self.links {
+            parents[link.joint as usize] = Some(link.parent as usize);
+        }
+        parents
+    }
+
     /// Number of ticks in a second.
     #[must_use]
     pub fn ticks_per_second(&self) -> u32 {
@@ -550,9 +563,10 @@ impl<'a> MotionStates<'a> {
 struct StateScratch {
     pose: PoseScratch,
     rotations: Vec<[f32; 4]>,
-    joints: Vec<Joint>,
-    /// The joints at both ends of a step.
-    ends: [Vec<Joint>; 2],
+    /// The states of instances, and those at both ends of their steps.
+    here: StateRows,
+    ends: [StateRows; 2],
+    walk: Vec<f32>,
 }
 
 /// Scratch memory for one pose.
@@ -563,17 +577,217 @@ struct PoseScratch {
     positions: Vec<CrowdPosition>,
     /// The keys at the start and at the end of the span of each joint.
     keys: [Vec<[f32; 4]>; 2],
-    /// The middles and tangents of the arcs between these.
+    /// The middles and tangents of the arcs between these, and the angular velocities along them. Vectors may reach beyond
+    /// the last joint.
     arcs: [Vec<[f32; 4]>; 2],
+    rates: Vec<[f32; 4]>,
 }
 
-/// A joint in the world.
-#[derive(Clone, Copy, Default)]
-struct Joint {
-    rotation: [f32; 4],
-    position: [f32; 3],
-    velocity: [f32; 3],
-    angular_velocity: [f32; 3],
+/// The states of as many instances as a vector has lanes, `[joint][instance]`. Positions and velocities end in a 0.
+#[derive(Default)]
+struct StateRows {
+    rotations: Vec<[f32; 4]>,
+    positions: Vec<[f32; 4]>,
+    velocities: Vec<[f32; 4]>,
+    angular_velocities: Vec<[f32; 4]>,
+}
+
+/// A joint in its parent's frame, or in the world.
+#[derive(Clone, Copy)]
+struct Joint<N> {
+    rotation: [N; 4],
+    position: [N; 3],
+    velocity: [N; 3],
+    angular_velocity: [N; 3],
+}
+
+/// The numbers of a joint's state.
+const JOINT_NUMBERS: usize = 13;
+
+impl StateRows {
+    fn resize(&mut self, count: usize) {
+        for rows in [
+            &mut self.rotations,
+            &mut self.positions,
+            &mut self.velocities,
+            &mut self.angular_velocities,
+        ] {
+            rows.resize(count, [0.0; 4]);
+        }
+    }
+
+    /// Converts the states from the parents' frames to the world. `memory` has room for the numbers of all joints, each as
+    /// a vector: as many instances are walked together.
+    #[inline(always)]
+    fn walk<L: Lanes>(&mut self, links: &[CrowdLink], moves: bool, memory: &mut [f32]) {
+        let each = JOINT_NUMBERS * L::COUNT;
+        let joints = self.rotations.len() / L::COUNT;
+        for (joint, numbers) in memory.chunks_exact_mut(each).take(joints).enumerate() {
+            self.joint::<L>(joint, moves).store(numbers);
+        }
+        for link in links {
+            let [parent, child] = [link.parent, link.joint].map(|joint| joint as usize * each);
+            let above = Joint::<L>::load(&memory[parent..parent + each]);
+            let numbers = &mut memory[child..child + each];
+            Joint::load(numbers).hung_on(&above, moves).store(numbers);
+        }
+        for (joint, numbers) in memory.chunks_exact(each).take(joints).enumerate() {
+            self.put::<L>(joint, &Joint::load(numbers), moves);
+        }
+    }
+
+    #[inline(always)]
+    fn joint<L: Lanes>(&self, joint: usize, moves: bool) -> Joint<L> {
+        let at = joint * L::COUNT;
+        let zero = [L::all(0.0), L::all(0.0), L::all(0.0)];
+        let [x, y, z, _] = L::load_rotations(&self.positions[at..]);
+        let mut found = Joint {
+            rotation: L::load_rotations(&self.rotations[at..]),
+            position: [x, y, z],
+            velocity: zero,
+            angular_velocity: zero,
+        };
+        if moves {
+            let [x, y, z, _] = L::load_rotations(&self.velocities[at..]);
+            found.velocity = [x, y, z];
+            let [x, y, z, _] = L::load_rotations(&self.angular_velocities[at..]);
+            found.angular_velocity = [x, y, z];
+        }
+        found
+    }
+
+    #[inline(always)]
+    fn put<L: Lanes>(&mut self, joint: usize, state: &Joint<L>, moves: bool) {
+        let at = joint * L::COUNT..(joint + 1) * L::COUNT;
+        let zero = L::all(0.0);
+        L::store_rotations(state.rotation, &mut self.rotations[at.clone()]);
+        let [x, y, z] = state.position;
+        L::store_rotations([x, y, z, zero], &mut self.positions[at.clone()]);
+        if moves {
+            let [x, y, z] = state.velocity;
+            L::store_rotations([x, y, z, zero], &mut self.velocities[at.clone()]);
+            let [x, y, z] = state.angular_velocity;
+            L::store_rotations([x, y, z, zero], &mut self.angular_velocities[at]);
+        }
+    }
+
+    /// Sets the velocities of an instance to the difference of two states, divided by the time between them,
+    /// `1 / per_second`.
+    #[inline(always)]
+    fn differ(&mut self, at: usize, [before, after]: [&Self; 2], per_second: f32) {
+        let [x, y, z, _] = before.positions[at];
+        let [a, b, c, _] = after.positions[at];
+        let [x, y, z] = scaled(sum([a, b, c], [-x, -y, -z]), per_second).map(canonical);
+        self.velocities[at] = [x, y, z, 0.0];
+        let [x, y, z, w] = before.rotations[at];
+        let [x, y, z, w] = product(after.rotations[at], [-x, -y, -z, w]).map(flushed);
+        let sine = root(x * x + y * y + z * z);
+        // The shorter arc, by the rotation vector's length; 0 if the angle is.
+        let scale = match sine == 0.0 {
+            true => 0.0,
+            false => 2.0 * arc_tangent(sine, w.abs()) * reciprocal(sine),
+        };
+        let scale = if w < 0.0 { -scale } else { scale };
+        let [x, y, z] = scaled([x, y, z], scale * per_second).map(canonical);
+        self.angular_velocities[at] = [x, y, z, 0.0];
+    }
+}
+
+impl<L: Lanes> Joint<L> {
+    #[inline(always)]
+    fn load(numbers: &[f32]) -> Self {
+        #[inline(always)]
+        fn number<L: Lanes>(numbers: &[f32], index: usize) -> L {
+            L::load_unordered(&numbers[index * L::COUNT..])
+        }
+        #[inline(always)]
+        fn three<L: Lanes>(numbers: &[f32], first: usize) -> [L; 3] {
+            [
+                number(numbers, first),
+                number(numbers, first + 1),
+                number(numbers, first + 2),
+            ]
+        }
+        let [x, y, z] = three(numbers, 0);
+        Self {
+            rotation: [x, y, z, number(numbers, 3)],
+            position: three(numbers, 4),
+            velocity: three(numbers, 7),
+            angular_velocity: three(numbers, 10),
+        }
+    }
+
+    #[inline(always)]
+    fn store(self, numbers: &mut [f32]) {
+        let all = [
+            &self.rotation[..],
+            &self.position,
+            &self.velocity,
+            &self.angular_velocity,
+        ];
+        let mut numbers = numbers.chunks_exact_mut(L::COUNT);
+        for part in all {
+            for (&number, lanes) in part.iter().zip(&mut numbers) {
+                number.store_unordered(lanes);
+            }
+        }
+    }
+}
+
+/// [`canonical`] of each number.
+#[inline(always)]
+fn canonical3<N: Number>([x, y, z]: [N; 3]) -> [N; 3] {
+    [x.canonical(), y.canonical(), z.canonical()]
+}
+
+impl<N: Number> Joint<N> {
+    /// The joint's state in the world, of that in its parent's frame.
+    #[inline(always)]
+    fn hung_on(self, parent: &Self, moves: bool) -> Self {
+        let arm = rotated(parent.rotation, self.position);
+        let rotation = product(parent.rotation, self.rotation);
+        // One step of Newton's: rounding does not add up along the skeleton.
+        let scale = N::all(1.5) - N::all(0.5) * dot(rotation, rotation);
+        let [x, y, z, w] = rotation;
+        let mut found = Self {
+            rotation: [
+                (x * scale).canonical(),
+                (y * scale).canonical(),
+                (z * scale).canonical(),
+                (w * scale).canonical(),
+            ],
+            position: canonical3(sum(parent.position, arm)),
+            ..self
+        };
+        if moves {
+            let relative = rotated(parent.rotation, self.velocity);
+            let carried = sum(parent.velocity, cross3(parent.angular_velocity, arm));
+            found.velocity = canonical3(sum(carried, relative));
+            let relative = rotated(parent.rotation, self.angular_velocity);
+            found.angular_velocity = canonical3(sum(parent.angular_velocity, relative));
+        }
+        found
+    }
+}
+
+/// The angular velocities along arcs of neighbouring joints, about the parents' axes: twice the tangent over the middle,
+/// times the parameter's rate.
+#[inline(always)]
+fn rates_of_arcs<L: Lanes>(
+    joints: Range<usize>,
+    [middles, tangents]: [&[[f32; 4]]; 2],
+    rate: f32,
+    rates: &mut [[f32; 4]],
+) {
+    let factor = L::all(2.0 * rate);
+    for first in joints.step_by(L::COUNT) {
+        let [x, y, z, w] = L::load_rotations(&middles[first..]);
+        let slope = L::load_rotations(&tangents[first..]);
+        let [x, y, z, _] = product(slope, [-x, -y, -z, w]);
+        let [x, y, z] = canonical3(scaled([x, y, z], factor));
+        let rates = &mut rates[first..first + L::COUNT];
+        L::store_rotations([x, y, z, L::all(0.0)], rates);
+    }
 }
 
 /// Some instances.
@@ -619,50 +833,97 @@ impl InLanes for StatesTask<'_, '_> {
         let StateScratch {
             pose,
             rotations,
-            joints: world,
+            here,
             ends,
+            walk,
         } = &mut *self.memory;
         rotations.resize(joints, [0.0; 4]);
-        for joints_of in [&mut *world].into_iter().chain(&mut *ends) {
-            joints_of.resize(joints, Joint::default());
+        here.resize(joints * L::COUNT);
+        if self.steps.is_some() {
+            for end in &mut *ends {
+                end.resize(joints * L::COUNT);
+            }
         }
-        for memory in pose.keys.iter_mut().chain(&mut pose.arcs) {
+        walk.resize(joints * JOINT_NUMBERS * L::COUNT, 0.0);
+        for memory in &mut pose.keys {
             memory.resize(joints, [0.0; 4]);
         }
-        for (instance, &(clip, tick)) in self.at.iter().enumerate() {
-            let at = instance * joints..(instance + 1) * joints;
-            let is_posed = values_of_pose > PoseValues::Rotations || !states.rotations.is_empty();
-            let local = match states.rotations.get_mut(at.clone()) {
-                Some(rotations) => rotations,
-                None => &mut rotations[..],
-            };
-            if is_posed {
-                poses.compute::<L>((clip, tick), values_of_pose, pose, local, world);
+        for memory in pose.arcs.iter_mut().chain([&mut pose.rates]) {
+            memory.resize(joints + L::COUNT, [0.0; 4]);
+        }
+        let is_posed = values_of_pose > PoseValues::Rotations || !states.rotations.is_empty();
+        for (group, instances) in self.at.chunks(L::COUNT).enumerate() {
+            let first = group * L::COUNT;
+            for (lane, &(clip, tick)) in instances.iter().enumerate() {
+                let at = (first + lane) * joints..(first + lane + 1) * joints;
+                if is_posed {
+                    let local = match states.rotations.get_mut(at) {
+                        Some(rotations) => rotations,
+                        None => &mut rotations[..],
+                    };
+                    let rows = (&mut *here, lane);
+                    poses.compute::<L>((clip, tick), values_of_pose, pose, local, rows);
+                }
+                if let (Some(steps), true) = (self.steps, moves) {
+                    for (end, tick) in ends.iter_mut().zip(steps[first + lane].ticks) {
+                        let values = PoseValues::World;
+                        poses.compute::<L>((clip, tick), values, pose, rotations, (end, lane));
+                    }
+                }
+            }
+            if values_of_pose > PoseValues::Rotations {
+                let moves = values_of_pose == PoseValues::Velocities;
+                here.walk::<L>(&tables.links, moves, walk);
             }
             if let (Some(steps), true) = (self.steps, moves) {
-                let step = steps[instance];
-                for (end, tick) in ends.iter_mut().zip(step.ticks) {
-                    poses.compute::<L>((clip, tick), PoseValues::World, pose, rotations, end);
+                for end in &mut *ends {
+                    end.walk::<L>(&tables.links, false, walk);
                 }
                 let [before, after] = &*ends;
-                let steps = before.iter().zip(after);
-                for (state, (before, after)) in world.iter_mut().zip(steps) {
-                    state.differ(before, after, step.per_second);
+                for joint in 0..joints {
+                    for (lane, step) in steps[first..][..instances.len()].iter().enumerate() {
+                        let at = joint * L::COUNT + lane;
+                        here.differ(at, [before, after], step.per_second);
+                    }
                 }
             }
-            fn put<T: Copy>(to: &mut [T], at: Range<usize>, world: &[Joint], of: fn(&Joint) -> T) {
-                for (value, joint) in to.get_mut(at).into_iter().flatten().zip(world) {
-                    *value = of(joint);
-                }
+            for lane in 0..instances.len() {
+                let at = (first + lane) * joints..(first + lane + 1) * joints;
+                let positions = states.positions.get_mut(at.clone());
+                put(
+                    positions,
+                    &here.positions,
+                    (lane, L::COUNT),
+                    |[x, y, z, _]| [x, y, z],
+                );
+                let rotations = states.world_rotations.get_mut(at.clone());
+                put(rotations, &here.rotations, (lane, L::COUNT), |row| row);
+                let velocities = states.velocities.get_mut(at.clone());
+                put(
+                    velocities,
+                    &here.velocities,
+                    (lane, L::COUNT),
+                    |[x, y, z, _]| [x, y, z],
+                );
+                let rates = states.angular_velocities.get_mut(at);
+                let of_rates = &here.angular_velocities;
+                put(rates, of_rates, (lane, L::COUNT), |[x, y, z, _]| [x, y, z]);
             }
-            put(states.positions, at.clone(), world, |joint| joint.position);
-            put(states.world_rotations, at.clone(), world, |joint| {
-                joint.rotation
-            });
-            put(states.velocities, at.clone(), world, |joint| joint.velocity);
-            put(states.angular_velocities, at, world, |joint| {
-                joint.angular_velocity
-            });
+        }
+    }
+}
+
+/// Stores the values of an instance's joints in an array that is not left out.
+#[inline(always)]
+fn put<T>(
+    array: Option<&mut [T]>,
+    rows: &[[f32; 4]],
+    (lane, lanes): (usize, usize),
+    of: fn([f32; 4]) -> T,
+) {
+    if let Some(array) = array {
+        for (value, row) in array.iter_mut().zip(rows[lane..].iter().step_by(lanes)) {
+            *value = of(*row);
         }
     }
 }
@@ -676,7 +937,8 @@ struct Poses<'a> {
 }
 
 impl Poses<'_> {
-    /// Computes the pose of a clip at a tick: rotations in the parents' frames to `local`, the rest to `world`.
+    /// Computes the pose of a clip at a tick: rotations in the parents' frames to `local`, and all states in the parents'
+    /// frames to the rows of a lane.
     #[inline(always)]
     fn compute<L: Lanes>(
         &self,
@@ -684,7 +946,7 @@ impl Poses<'_> {
         values_of_pose: PoseValues,
         scratch: &mut PoseScratch,
         local: &mut [[f32; 4]],
-        world: &mut [Joint],
+        (rows, lane): (&mut StateRows, usize),
     ) {
         let Self {
             tables,
@@ -735,70 +997,31 @@ impl Poses<'_> {
                 .map(|keys| &mut keys[joints.clone()]);
             let arcs = (scratch.arcs.each_mut()).map(|arcs| &mut arcs[joints.clone()]);
             moment.rotations_of_keys::<L>(channel, moves, keys, arcs, values);
+            if moves {
+                let (.., rate) = moment.along(channel);
+                let [middles, tangents] = &scratch.arcs;
+                rates_of_arcs::<L>(joints, [middles, tangents], rate, &mut scratch.rates);
+            }
         }
         if values_of_pose == PoseValues::Rotations {
             return;
         }
-        for (joint, state) in world.iter_mut().enumerate() {
-            let [rotation, moved] = [
+        for (joint, &rotation) in local.iter().enumerate() {
+            let [rotates, moved] = [
                 &channels[joint * 3],
                 &channels[joint * 3 + TRANSLATION as usize],
             ];
+            let row = joint * L::COUNT + lane;
             let [x, y, z, _] = moment.value(moved);
-            *state = Joint {
-                rotation: local[joint],
-                position: [x, y, z],
-                ..Joint::default()
-            };
+            (rows.rotations[row], rows.positions[row]) = (rotation, [x, y, z, 0.0]);
             if moves {
-                let arc = [0, 1].map(|part: usize| scratch.arcs[part][joint]);
-                state.angular_velocity = moment.angular_velocity(rotation, arc);
-                state.velocity = moment.velocity(moved);
+                rows.angular_velocities[row] = match keeps_keys(rotates.form_and_base >> 24) {
+                    true => scratch.rates[joint],
+                    false => moment.angular_velocity(rotates),
+                };
+                rows.velocities[row] = moment.velocity(moved);
             }
         }
-        for link in &tables.links {
-            let parent = world[link.parent as usize];
-            let child = &mut world[link.joint as usize];
-            child.hang_on(&parent, moves);
-        }
-    }
-}
-
-impl Joint {
-    /// Converts the joint's state from its parent's frame to the world.
-    #[inline(always)]
-    fn hang_on(&mut self, parent: &Self, moves: bool) {
-        let arm = rotated(parent.rotation, self.position);
-        self.position = sum(parent.position, arm).map(canonical);
-        let rotation = product(parent.rotation, self.rotation);
-        // One step of Newton's: rounding does not add up along the skeleton.
-        let scale = 1.5 - 0.5 * dot(rotation, rotation);
-        self.rotation = rotation.map(|component| canonical(component * scale));
-        if !moves {
-            return;
-        }
-        let relative = rotated(parent.rotation, self.velocity);
-        let carried = sum(parent.velocity, cross3(parent.angular_velocity, arm));
-        self.velocity = sum(carried, relative).map(canonical);
-        let relative = rotated(parent.rotation, self.angular_velocity);
-        self.angular_velocity = sum(parent.angular_velocity, relative).map(canonical);
-    }
-
-    /// Sets the velocities to the difference of two states, divided by the time between them, `1 / per_second`.
-    #[inline(always)]
-    fn differ(&mut self, before: &Self, after: &Self, per_second: f32) {
-        let [x, y, z] = before.position.map(|coordinate| -coordinate);
-        self.velocity = scaled(sum(after.position, [x, y, z]), per_second).map(canonical);
-        let [x, y, z, w] = before.rotation;
-        let [x, y, z, w] = product(after.rotation, [-x, -y, -z, w]).map(flushed);
-        let sine = root(x * x + y * y + z * z);
-        // The shorter arc, by the rotation vector's length; 0 if the angle is.
-        let scale = match sine == 0.0 {
-            true => 0.0,
-            false => 2.0 * arc_tangent(sine, w.abs()) * reciprocal(sine),
-        };
-        let scale = if w < 0.0 { -scale } else { scale };
-        self.angular_velocity = scaled([x, y, z], scale * per_second).map(canonical);
     }
 }
 
@@ -810,8 +1033,8 @@ fn spans_in(base: &CrowdBase, ticks: i64, period: u32) -> i64 {
 }
 
 /// The position of a tick in a time base, as [`position_at`] computes it. Most keys are at even times, or intervals are
-/// divided about evenly. Therefore a guessed span is tried first, and then those to which the distance from it points. A
-/// search from the ends would wait for memory at each step.
+/// divided about evenly. Therefore a guessed span is tried first, then its neighbours, and then those to which the distance
+/// from it points. A search from the ends would wait for memory at each step.
 #[inline(always)]
 fn guessed_position(
     base: &CrowdBase,
@@ -819,31 +1042,42 @@ fn guessed_position(
     (tick, period): (u32, u32),
     guess: u32,
 ) -> CrowdPosition {
-    let count = i64::from(base.count);
-    let base_spans = &spans[base.first as usize..][..base.count as usize];
-    let start = |index: i64| i64::from(base_spans[index as usize].start & TICKS);
-    let tick_number = i64::from(tick);
-    let mut index = i64::from(guess).min(count - 1);
+    let count = base.count as usize;
+    let base_spans = &spans[base.first as usize..][..count];
+    let start = |index: usize| base_spans[index].start & TICKS;
+    let mut index = (guess as usize).min(count - 1);
+    let is_before_next = index + 1 == count || tick < start(index + 1);
+    if start(index) <= tick && is_before_next {
+        return position_in(base, spans, tick, index);
+    }
     for _ in 0..GUESSES {
-        let distance = tick_number - start(index);
-        let is_before_next = index + 1 == count || tick_number < start(index + 1);
-        if distance >= 0 && is_before_next {
-            let only = CrowdBase {
-                first: base.first + index as u32,
-                count: 1,
-                step: 0,
-            };
-            let position = position_at(&only, spans, tick);
-            let span = position.span + index as u32;
-            return CrowdPosition { span, ..position };
+        let first = (index.saturating_sub(NEIGHBOURS / 2)).min(count.saturating_sub(NEIGHBOURS));
+        let neighbours = &base_spans[first..count.min(first + NEIGHBOURS)];
+        // All are compared, because branches could not be predicted.
+        let is_begun = |span: &CrowdSpan| usize::from(span.start & TICKS <= tick);
+        let begun: usize = neighbours.iter().map(is_begun).sum();
+        let is_found = begun > 0 && (begun < neighbours.len() || first + begun == count);
+        if is_found {
+            return position_in(base, spans, tick, first + begun - 1);
         }
-        // At least one span on.
-        index = match distance < 0 {
-            true => (index + spans_in(base, distance, period) - 1).max(0),
-            false => (index + spans_in(base, distance, period).max(1)).min(count - 1),
-        };
+        let at = i64::from(tick) - i64::from(start(index));
+        let moved = index as i64 + spans_in(base, at, period);
+        index = moved.clamp(0, count as i64 - 1) as usize;
     }
     position_at(base, spans, tick)
+}
+
+/// The position of a tick in a span of a time base.
+#[inline(always)]
+fn position_in(base: &CrowdBase, spans: &[CrowdSpan], tick: u32, index: usize) -> CrowdPosition {
+    let only = CrowdBase {
+        first: base.first + index as u32,
+        count: 1,
+        step: 0,
+    };
+    let position = position_at(&only, spans, tick);
+    let span = position.span + index as u32;
+    CrowdPosition { span, ..position }
 }
 
 /// A moment of a clip.
@@ -946,12 +1180,12 @@ impl ClipMoment<'_> {
         (index, parameter, span.scale * self.per_second)
     }
 
-    /// The angular velocity of a rotation, about the parent's axes. `arc` is that of a channel with keys.
+    /// The angular velocity of a rotation whose channel has constants, about the parent's axes.
     #[inline(always)]
-    fn angular_velocity(&self, channel: &CrowdChannel, arc: [[f32; 4]; 2]) -> [f32; 3] {
+    fn angular_velocity(&self, channel: &CrowdChannel) -> [f32; 4] {
         let form = channel.form_and_base >> 24;
         if form == FORM_CONSTANT {
-            return [0.0; 3];
+            return [0.0; 4];
         }
         let (span, s, rate) = self.along(channel);
         let (rotation, slope) = match form {
@@ -962,19 +1196,19 @@ impl ClipMoment<'_> {
                     [first, first + channel.count].map(|cell| self.cells[cell as usize]);
                 (middle, tangent)
             }
-            FORM_KEYS | FORM_PACKED => (arc[0], arc[1]),
             _ => self.polynomial::<POWERS>(channel, span, s),
         };
         let [x, y, z, w] = rotation;
         let [x, y, z, _] = product(slope, [-x, -y, -z, w]);
-        scaled([x, y, z], 2.0 * rate).map(canonical)
+        let [x, y, z] = scaled([x, y, z], 2.0 * rate).map(canonical);
+        [x, y, z, 0.0]
     }
 
     /// The derivative of a translation, in the parent's frame.
     #[inline(always)]
-    fn velocity(&self, channel: &CrowdChannel) -> [f32; 3] {
+    fn velocity(&self, channel: &CrowdChannel) -> [f32; 4] {
         if channel.form_and_base >> 24 == FORM_CONSTANT {
-            return [0.0; 3];
+            return [0.0; 4];
         }
         let (span, s, rate) = self.along(channel);
         let (_, [x, y, z, _]) = match channel.form_and_base >> 24 {
@@ -987,7 +1221,8 @@ impl ClipMoment<'_> {
             }
             _ => self.polynomial::<POWERS>(channel, span, s),
         };
-        scaled([x, y, z], rate).map(canonical)
+        let [x, y, z] = scaled([x, y, z], rate).map(canonical);
+        [x, y, z, 0.0]
     }
 
     /// A polynomial's value and its derivative by its parameter.

@@ -1,71 +1,45 @@
-//! Rotations as matrices and as rotation vectors, which are computed on the engine's threads.
+//! Rotations in other representations, which are computed on the engine's threads.
 
 use rayon::prelude::*;
 
 use crate::engine::Engine;
 use crate::error::Error;
 use crate::math::quaternion::log;
-use crate::output::encoding::{Encoding, EncodingLengthError, MatrixOrder};
+use crate::output::encoding::{Encoding, EncodingLengthError};
 use crate::simd::dispatch::{InLanes, in_lanes};
 use crate::simd::lanes::Lanes;
 
 /// The number of rotations in a task.
 const TASK: usize = 256;
 
-/// The numbers of a matrix.
-const MATRIX_NUMBERS: usize = 9;
-
-/// The numbers of the first two columns or rows of a matrix.
-const PAIR_NUMBERS: usize = 6;
-
 /// The numbers of a rotation vector.
 const VECTOR_NUMBERS: usize = 3;
 
 impl Engine {
-    /// Stores the matrices of rotations, `x y z w` each, or only the first two columns or rows of each: models that learn
-    /// take these six numbers (Zhou et al. 2019). `output` has 9 or 6 numbers for each rotation. They are those of
-    /// [`Encoding::Matrix3x3`], and are computed on the threads of the engine.
+    /// Encodes rotations, `x y z w` each, as [`Encoding::encode`], on the threads of the engine.
     ///
     /// ```
-    /// use tumble::{Device, Engine, MatrixOrder};
-    /// let mut six = [0.0; 6];
+    /// use tumble::{Device, Encoding, Engine};
+    /// let mut six = [0.0_f32; 6];
     /// let engine = Engine::new(Device::Cpu)?;
-    /// engine.matrices_into(&[[0.0, 0.0, 1.0, 0.0]], MatrixOrder::ColumnMajor, &mut six)?;
+    /// engine.encode(&[[0.0, 0.0, 1.0, 0.0]], Encoding::SixD, tumble::bytemuck::cast_slice_mut(&mut six))?;
     /// assert_eq!(six, [-1.0, 0.0, 0.0, 0.0, -1.0, 0.0]);
     /// # Ok::<(), tumble::Error>(())
     /// ```
     ///
     /// # Errors
-    /// When `output` has neither 9 nor 6 numbers for each rotation, or the system refuses threads.
-    pub fn matrices_into(
+    /// When the length of `output` is not [`Encoding::bytes`] for each rotation, or the system refuses threads.
+    pub fn encode(
         &self,
         rotations: &[[f32; 4]],
-        order: MatrixOrder,
-        output: &mut [f32],
+        encoding: Encoding,
+        output: &mut [u8],
     ) -> Result<(), Error> {
-        let encoding = Encoding::Matrix3x3(order);
-        let is_of_pairs = output.len() == PAIR_NUMBERS * rotations.len();
-        if !is_of_pairs {
-            encoding.check_length(rotations.len(), size_of_val(output))?;
-        }
-        let numbers = if is_of_pairs {
-            PAIR_NUMBERS
-        } else {
-            MATRIX_NUMBERS
+        encoding.check_length(rotations.len(), output.len())?;
+        let task = |(rotations, output): (&[[f32; 4]], &mut [u8])| {
+            encoding.encode_all(rotations, output);
         };
-        let task = |(rotations, output): (&[[f32; 4]], &mut [f32])| {
-            if !is_of_pairs {
-                encoding.encode_all(rotations, bytemuck::cast_slice_mut(output));
-                return;
-            }
-            let matrices = &mut [[0.0_f32; MATRIX_NUMBERS]; TASK][..rotations.len()];
-            encoding.encode_all(rotations, bytemuck::cast_slice_mut(matrices));
-            let pairs = output.as_chunks_mut::<PAIR_NUMBERS>().0;
-            for (pair, matrix) in pairs.iter_mut().zip(&*matrices) {
-                pair.copy_from_slice(&matrix[..PAIR_NUMBERS]);
-            }
-        };
-        self.in_tasks(rotations, output, numbers, task)
+        self.in_tasks(rotations, output, encoding.bytes(), task)
     }
 
     /// Stores the rotation vectors of rotations, `x y z w` each: the axis times the angle in radians, which is at most π, as
@@ -100,20 +74,20 @@ impl Engine {
         self.in_tasks(rotations, output, VECTOR_NUMBERS, task)
     }
 
-    /// Runs a task for each part of the rotations, on the engine's threads. The result of a rotation has `numbers` numbers.
-    fn in_tasks(
+    /// Runs a task for each part of the rotations, on the engine's threads. The result of a rotation has `each` elements.
+    fn in_tasks<T: Send>(
         &self,
         rotations: &[[f32; 4]],
-        output: &mut [f32],
-        numbers: usize,
-        task: impl Fn((&[[f32; 4]], &mut [f32])) + Sync,
+        output: &mut [T],
+        each: usize,
+        task: impl Fn((&[[f32; 4]], &mut [T])) + Sync,
     ) -> Result<(), Error> {
         if rotations.len() <= TASK {
             task((rotations, output));
             return Ok(());
         }
         let work = || {
-            let outputs = output.par_chunks_mut(TASK * numbers);
+            let outputs = output.par_chunks_mut(TASK * each);
             rotations.par_chunks(TASK).zip(outputs).for_each(&task);
         };
         Ok(self.machine.threads().run(work)?)

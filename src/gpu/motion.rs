@@ -17,6 +17,7 @@ use crate::gpu::recorded::{Binding, Recorded};
 use crate::gpu::submission::Submission;
 use crate::gpu::upload::Upload;
 use crate::machine::error::{EvaluateError, VulkanError};
+use crate::output::encoding::Encoding;
 use crate::output::states::StateArray;
 use crate::shader::{CrowdBase, CrowdChannel, CrowdClip, CrowdLink, CrowdSpan, MotionSample};
 use crate::threads::exclusive::Exclusive;
@@ -50,6 +51,8 @@ pub(crate) struct StatesRequest<'a> {
     pub(crate) at: &'a [MotionSample],
     pub(crate) steps: Option<StateSteps>,
     pub(crate) arrays: &'a [StateArray],
+    /// That of rotations: quaternions in f32, or numbers of matrices.
+    pub(crate) rotations: Encoding,
 }
 
 /// The samples between which velocities are differences, of each instance.
@@ -187,7 +190,8 @@ impl ResidentMotions {
 
     /// The ranges of arrays in a result.
     fn ranges(&self, request: &StatesRequest<'_>) -> Vec<Range<u64>> {
-        StateArray::ranges(request.arrays, request.at.len() * self.joints as usize)
+        let joints = request.at.len() * self.joints as usize;
+        StateArray::ranges(request.arrays, request.rotations, joints)
     }
 
     /// Computes states into memory that other interfaces on the same card import, and the ranges of the arrays. If they
@@ -283,6 +287,7 @@ impl ResidentMotions {
             links: self.link_count,
             ticks_per_second: self.ticks_per_second,
             arrays: request.arrays,
+            rotations: request.rotations,
             are_differences: request.steps.is_some(),
             instances: request.at.len(),
         };

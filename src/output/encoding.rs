@@ -5,7 +5,7 @@ use std::fmt;
 use std::ops::Range;
 use std::str::FromStr;
 
-use glam::{Mat3, Quat};
+use glam::{Mat3, Quat, Vec3};
 
 use crate::math::quaternion::about;
 use crate::names::fields::with_fields;
@@ -240,6 +240,23 @@ representations! {
             MatrixOrder::ColumnMajor => by!(matrix::store3x4_columns),
         },
         decode: |number, order| of_matrix(number, if order == 0 { 4 } else { 3 }, order),
+        ..OF_ROTATIONS
+    }
+    /// The first two columns of the 3 × 3 matrix, one after the other: the six numbers that models learn (Zhou et al.
+    /// 2019, On the Continuity of Rotation Representations in Neural Networks). Six f32.
+    SixD {
+        kinds: [Self::SixD],
+        name: "6d",
+        summary: "the first two columns of the 3 × 3 matrix",
+        shape: &[6],
+        components: &["m00", "m10", "m20", "m01", "m11", "m21"],
+        store: Store::SixD,
+        detail: MatrixOrder::ColumnMajor as u32,
+        encode: by!(matrix::first_two),
+        decode: |number, _| {
+            let [x, y] = [0, 3].map(|first| Vec3::from_array([0, 1, 2].map(|i| number(first + i))));
+            Quat::from_mat3(&Mat3::from_cols(x, y, x.cross(y))).to_array()
+        },
         ..OF_ROTATIONS
     }
     /// Three angles in degrees, in the order of the sequence: the first and the third within ±180; the second within

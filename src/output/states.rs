@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use crate::names::names;
+use crate::output::encoding::Encoding;
 use crate::output::pose_error::OFFSET_STEP;
 use crate::shader::{ANGULAR_VELOCITY, LOCAL_ROTATION, POSITION, VELOCITY, WORLD_ROTATION};
 
@@ -32,12 +33,12 @@ names! {
 }
 
 impl StateArray {
-    /// The number of f32 numbers of a joint.
+    /// The encoding of the array, if that of rotations is `rotations`. All have f32 numbers.
     #[must_use]
-    pub fn numbers(self) -> usize {
+    pub fn encoding(self, rotations: Encoding) -> Encoding {
         match self {
-            Self::Rotations | Self::WorldRotations => 4,
-            Self::Positions | Self::Velocities | Self::AngularVelocities => 3,
+            Self::Rotations | Self::WorldRotations => rotations,
+            Self::Positions | Self::Velocities | Self::AngularVelocities => Encoding::Vector,
         }
     }
 
@@ -54,11 +55,11 @@ impl StateArray {
 
     /// The ranges in bytes of arrays in a result, for so many joints of instances. Each starts where a kernel can bind
     /// it.
-    pub(crate) fn ranges(arrays: &[Self], joints: usize) -> Vec<Range<u64>> {
+    pub(crate) fn ranges(arrays: &[Self], rotations: Encoding, joints: usize) -> Vec<Range<u64>> {
         let mut end = 0u64;
         let range = |array: &Self| {
             let start = end.next_multiple_of(OFFSET_STEP);
-            end = start + 4 * joints as u64 * array.numbers() as u64;
+            end = start + joints as u64 * array.encoding(rotations).bytes() as u64;
             start..end
         };
         arrays.iter().map(range).collect()

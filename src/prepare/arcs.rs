@@ -167,17 +167,30 @@ fn listed(signs: Signs<'_>, intervals: Range<usize>, first_key: u32) -> impl Ite
 
 /// The arcs that a group lists for a device to compute; empty if it has computed them.
 pub(crate) fn listed_arcs(prepared: &Prepared) -> Vec<ArcSegment> {
-    let arc = |&interval: &u32| {
-        let key = (interval & KEY_OF_INTERVAL) as usize;
-        let signed = |key: usize, flag| match interval & flag {
-            0 => prepared.constants[key],
-            _ => prepared.constants[key].map(|component| -component),
-        };
-        let [from, to] = [signed(key, START_NEGATED), signed(key + 1, END_NEGATED)];
-        let (middle, tangent) = arc_between(from, to);
-        ArcSegment { middle, tangent }
+    let intervals = prepared.segments.intervals.iter();
+    intervals
+        .map(|&interval| listed_arc(prepared, interval))
+        .collect()
+}
+
+fn listed_arc(prepared: &Prepared, interval: u32) -> ArcSegment {
+    let key = (interval & KEY_OF_INTERVAL) as usize;
+    let signed = |key: usize, flag| match interval & flag {
+        0 => prepared.constants[key],
+        _ => prepared.constants[key].map(|component| -component),
     };
-    prepared.segments.intervals.iter().map(arc).collect()
+    let [from, to] = [signed(key, START_NEGATED), signed(key + 1, END_NEGATED)];
+    let (middle, tangent) = arc_between(from, to);
+    ArcSegment { middle, tangent }
+}
+
+/// An arc of a group, which is computed now if it was only listed.
+pub(crate) fn arc_at(prepared: &Prepared, index: u32) -> ArcSegment {
+    let segments = &prepared.segments;
+    match segments.are_arcs_listed {
+        true => listed_arc(prepared, segments.intervals[index as usize]),
+        false => segments.arcs[index as usize],
+    }
 }
 
 /// The middle of an arc between two keys if the arc exceeds 180°; then it becomes two arcs.

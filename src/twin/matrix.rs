@@ -1,4 +1,5 @@
-//! Matrices, of `shaders/math/matrix.wgsl`, `shaders/stores/matrix3x3.wgsl` and `shaders/stores/matrix3x4.wgsl`.
+//! Matrices, of `shaders/math/matrix.wgsl`, and their stores: `shaders/stores/matrix3x3.wgsl`,
+//! `shaders/stores/matrix3x4.wgsl` and `shaders/stores/six_d.wgsl`.
 
 use crate::math::canonical::canonical;
 pub(crate) use crate::twin::functions::{MatrixRows, matrix_rows};
@@ -12,6 +13,13 @@ pub(crate) fn rows(rotation: [f32; 4], detail: u32) -> [[f32; 3]; 3] {
         third,
     } = matrix_rows(rotation, detail);
     [first, second, third].map(|row| row.map(canonical))
+}
+
+/// The first two rows, or columns, as they are stored.
+#[inline(always)]
+pub(crate) fn first_two(rotation: [f32; 4], detail: u32) -> [[f32; 3]; 2] {
+    let [first, second, _] = rows(rotation, detail);
+    [first, second]
 }
 
 /// The rows that `store` writes in row-major order.

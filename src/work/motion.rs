@@ -3,6 +3,7 @@
 
 use std::ops::Range;
 
+use crate::output::encoding::Encoding;
 use crate::output::states::StateArray;
 use crate::shader::{Kernel, MOTION_WORKGROUP, MotionDispatch, STATE_VECTORS, WORKGROUP};
 use crate::work::recording::{Recording, Resource, Set, workgroups};
@@ -16,6 +17,8 @@ pub(crate) struct StatesShape<'a> {
     pub(crate) links: u32,
     pub(crate) ticks_per_second: f32,
     pub(crate) arrays: &'a [StateArray],
+    /// That of rotations: quaternions in f32, or numbers of matrices.
+    pub(crate) rotations: Encoding,
     /// Whether velocities are differences between two samples, instead of derivatives.
     pub(crate) are_differences: bool,
     /// The number of instances of all windows.
@@ -93,6 +96,7 @@ pub(crate) fn record_window(
         ticks_per_second: shape.ticks_per_second,
         vector: 0,
         numbers: 0,
+        detail: 0,
     };
     let dispatch = |recording: &mut Recording, set: Set, arguments: MotionDispatch| {
         recording.dispatch(set, &arguments, workgroups(arguments.count));
@@ -126,15 +130,21 @@ pub(crate) fn record_window(
         dispatch(recording, set, of_instances);
     }
     for (array, range) in shape.arrays.iter().zip(ranges) {
-        let numbers = array.numbers() as u32;
-        let each = 4 * u64::from(joints) * u64::from(numbers);
+        let encoding = array.encoding(shape.rotations);
+        let numbers = encoding.components().len() as u32;
+        let each = u64::from(joints) * encoding.bytes() as u64;
         let first = range.start + u64::from(window.start) * each;
         let output = result.slice(first, u64::from(count) * each);
-        let set = recording.set(Kernel::MotionStore, [states.into(), output]);
+        let (kernel, count) = match encoding {
+            Encoding::F32 | Encoding::Vector => (Kernel::MotionStore, count * joints * numbers),
+            _ => (Kernel::MotionMatrices, count * joints),
+        };
+        let set = recording.set(kernel, [states.into(), output]);
         let stored = MotionDispatch {
-            count: count * joints * numbers,
+            count,
             vector: array.vector(),
             numbers,
+            detail: encoding.row().detail,
             ..arguments
         };
         dispatch(recording, set, stored);
@@ -147,6 +157,18 @@ mod tests {
     use crate::work::recording::tests::letters;
 
     fn steps(arrays: &[StateArray], are_differences: bool, links: u32) -> String {
+        let all = [Encoding::F32, Encoding::SixD]
+            .map(|rotations| steps_with(arrays, rotations, are_differences, links));
+        assert_eq!(all[0], all[1]);
+        all[0].clone()
+    }
+
+    fn steps_with(
+        arrays: &[StateArray],
+        rotations: Encoding,
+        are_differences: bool,
+        links: u32,
+    ) -> String {
         let mut recording = Recording::default();
         let mut next = || recording.resource();
         let resources = StatesResources {
@@ -166,10 +188,11 @@ mod tests {
             links,
             ticks_per_second: 30.0,
             arrays,
+            rotations,
             are_differences,
             instances: 5,
         };
-        let ranges = vec![0..4096; arrays.len()];
+        let ranges = StateArray::ranges(arrays, rotations, 15);
         record_window(&mut recording, &shape, &resources, 0..5, &ranges);
         letters(&recording).replace("[Kernel>Kernel]", "|")
     }

@@ -8,7 +8,9 @@ use tumble::crowd::{
     StateArray,
 };
 use tumble::vulkan::VulkanError;
-use tumble::{Device, Engine, EngineOptions, Method, VectorMethod, method};
+use tumble::{
+    Device, Encoding, Engine, EngineOptions, MatrixOrder, Method, VectorMethod, method,
+};
 
 type Tables = (MotionTables, Vec<[u32; 4]>, Vec<[f32; 4]>);
 
@@ -76,13 +78,37 @@ fn states_have_the_bits_of_the_cpu_in_every_form_of_clips() {
             // All at once, and each alone, which skips what it does not need.
             let each = StateArray::ALL.map(|array| vec![array]);
             for arrays in each.iter().chain([&StateArray::ALL.to_vec()]) {
-                let (found, ranges) = of_device.sample(&at, None, arrays).unwrap();
+                let (found, ranges) = of_device.sample(&at, None, arrays, Encoding::F32).unwrap();
                 for (&array, range) in arrays.iter().zip(ranges) {
                     let found = &found.bytes()[range];
                     assert!(
                         found == bits(&expected, array),
                         "{array} {method:?} {of_device:?}"
                     );
+                }
+            }
+        }
+        // Rotations in other encodings, beside an array of vectors.
+        let arrays = [
+            StateArray::WorldRotations,
+            StateArray::Positions,
+            StateArray::Rotations,
+        ];
+        let matrices = MatrixOrder::ALL.map(Encoding::Matrix3x3);
+        for encoding in matrices.into_iter().chain([Encoding::SixD]) {
+            let expected = arrays.map(|array| match array.encoding(encoding) {
+                Encoding::Vector => bits(&expected, array).to_vec(),
+                encoding => {
+                    let quaternions: &[[f32; 4]] = bytemuck::cast_slice(bits(&expected, array));
+                    let mut bytes = vec![0; quaternions.len() * encoding.bytes()];
+                    encoding.encode(quaternions, &mut bytes).unwrap();
+                    bytes
+                }
+            });
+            for of_device in &motions {
+                let (found, ranges) = of_device.sample(&at, None, &arrays, encoding).unwrap();
+                for (expected, range) in expected.iter().zip(ranges) {
+                    assert!(found.bytes()[range] == **expected, "{encoding} {of_device:?}");
                 }
             }
         }
@@ -100,7 +126,8 @@ fn states_have_the_bits_of_the_cpu_in_every_form_of_clips() {
                 StateArray::Rotations,
                 StateArray::Velocities,
             ];
-            let (found, ranges) = of_device.sample(&at, Some(&steps), &arrays).unwrap();
+            let sampled = of_device.sample(&at, Some(&steps), &arrays, Encoding::F32);
+            let (found, ranges) = sampled.unwrap();
             for (array, range) in arrays.into_iter().zip(ranges) {
                 let found = &found.bytes()[range];
                 assert!(
@@ -129,12 +156,14 @@ fn windows_and_threads_do_not_change_states() {
             for _ in 0..2 {
                 scope.spawn(|| {
                     let array = StateArray::Positions;
-                    let (found, ranges) = motions.sample(&at, None, &[array]).unwrap();
+                    let sampled = motions.sample(&at, None, &[array], Encoding::F32);
+                    let (found, ranges) = sampled.unwrap();
                     assert!(found.bytes()[ranges[0].clone()] == *bits(&expected, array));
                 });
             }
         });
-        let (found, ranges) = motions.sample(&[], None, &StateArray::ALL).unwrap();
+        let sampled = motions.sample(&[], None, &StateArray::ALL, Encoding::SixD);
+        let (found, ranges) = sampled.unwrap();
         assert!(found.bytes().is_empty() && ranges.len() == 5);
     }
 }
@@ -154,9 +183,13 @@ fn requests_that_cannot_be_met_are_refused() {
         assert_eq!(broken, CrowdError::BrokenTables);
         let motions = DeviceMotions::new(&engine, &tables, parts).unwrap();
         let arrays = &[StateArray::Rotations];
-        let missing = motions.sample(&[(3, 0)], None, arrays).unwrap_err();
+        let sample = |at, steps, encoding| motions.sample(at, steps, arrays, encoding);
+        let missing = sample(&[(3, 0)], None, Encoding::F32).unwrap_err();
         assert!(matches!(missing, CrowdError::Missing { index: 3, .. }));
-        let steps = motions.sample(&[(0, 0)], Some(&[]), arrays).unwrap_err();
+        let refused = sample(&[(0, 0)], None, Encoding::F16).unwrap_err();
+        let encoding = Encoding::F16;
+        assert_eq!(refused, CrowdError::StateEncoding { encoding });
+        let steps = sample(&[(0, 0)], Some(&[]), Encoding::F32).unwrap_err();
         assert!(matches!(
             steps,
             CrowdError::OutputLength {

@@ -372,8 +372,8 @@ fn tables_of_keys_have_the_bits_of_tables_of_segments_and_packed_ones_are_within
         interpolation: method.into(),
         vectors,
     };
-    let clips: Vec<MotionClip<'_>> = sets.iter().map(clip).collect();
-    packed.push_all(&engine, &clips).unwrap();
+    let clip = |index: usize| Ok::<_, CrowdError>(clip(&sets[index]));
+    packed.push_all(&engine, sets.len(), clip).unwrap();
     let (tables, spans, cells) = whole.into_tables();
     let at = instances(&mut random, &tables, 2000);
     let expected = states(&engine, &tables, (&spans, &cells), &at);

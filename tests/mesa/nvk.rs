@@ -436,7 +436,7 @@ const fn goal(
     }
 }
 
-const GOALS: [Goal; 9] = [
+const GOALS: [Goal; 10] = [
     goal("arc_frames_spread_f32", 1, 16, Some(66), Some(54)),
     goal("polynomial_frames_spread_f32", 1, 16, Some(120), Some(104)),
     goal("arc_frames_spread_f16_converting", 1, 8, Some(72), Some(66)),
@@ -444,6 +444,7 @@ const GOALS: [Goal; 9] = [
     goal("arc_frames_spread_matrix3x4", 3, 48, Some(240), Some(200)),
     goal("polynomial_frames_spread_matrix3x4", 3, 48, None, None),
     goal("arc_frames_spread_matrix3x3", 9, 36, None, None),
+    goal("arc_frames_spread_six_d", 6, 24, None, None),
     goal("arc_frames_spread_axis_angle", 1, 16, None, None),
     goal("arc_frames_spread_euler", 3, 12, None, None),
 ];

@@ -52,7 +52,7 @@ pub struct RootMotion {
 }
 
 /// A rotation about the axis that points up.
-fn about_up(angle: f64, ground: Ground) -> DQuat {
+pub(super) fn about_up(angle: f64, ground: Ground) -> DQuat {
     let axis = ground.up() * libm::sin(0.5 * angle);
     DQuat::from_xyzw(axis.x, axis.y, axis.z, libm::cos(0.5 * angle))
 }
@@ -197,6 +197,7 @@ mod tests {
     use std::f64::consts::{PI, TAU};
 
     use super::*;
+    use crate::learning::HeadingFrame;
 
     /// A root that walks a curve and turns by a third of a turn, tilted by a constant rotation.
     fn walk(ground: Ground, frames: usize) -> (Vec<DVec3>, Vec<DQuat>) {
@@ -226,6 +227,11 @@ mod tests {
                     assert!(level.length() < 1e-15, "{ground} {heading}: {still}");
                     let left = heading.heading(upright, ground);
                     assert!(left.abs() < 1e-14, "{ground} {heading}: {left}");
+                    let follows = HeadingFrame::of(position, rotation, ground, heading);
+                    assert!((follows.position(position) - still).length() < 1e-14);
+                    // The motion counts whole turns, after which a quaternion has the other sign.
+                    let same = follows.rotation(rotation).dot(upright).abs();
+                    assert!((same - 1.0).abs() < 1e-14, "{ground} {heading}: {same}");
                     let (back, rotated) = motion.restored(frame, still, upright);
                     assert!((back - position).length() < 1e-14);
                     assert!((rotated - rotation).length() < 1e-14);

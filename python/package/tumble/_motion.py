@@ -11,7 +11,7 @@ import pathlib
 import zipfile
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any, Generic, Literal, TypeAlias, TypeVar, overload
 
@@ -27,9 +27,12 @@ from tumble._tumble import (
     Engine,
     File,
     Motions,
+    joint_partners,
     load,
     load_all,
+    mirror_pairs,
     put_w_first,
+    reframe,
     represent,
     scalar_motions,
     shaped,
@@ -65,7 +68,8 @@ _ALL: tuple[_Name, ...] = (*_NAMES, *_SCALARS)
 _SHAPES: dict[str, tuple[int, ...]] = {"quaternion": (4,), "matrix": (3, 3), "6d": (6,), "rotvec": (3,)}
 # Arrays in a file start at a multiple of this [bytes]: the alignment of every processor, and a cache line.
 _ALIGNED = 64
-_VERSION = 2
+# The latest version, which files with mirrored clips have.
+_VERSION = 3
 # Members of every file, in addition to those that the extension module requires.
 _STORED = ("version", "method", "names", "lengths", "rates")
 
@@ -123,6 +127,9 @@ if TYPE_CHECKING:
     _Device: TypeAlias = str | int | Engine
     _Array: TypeAlias = NDArray[np.float32]
     _Representation: TypeAlias = Literal["quaternion", "matrix", "6d", "rotvec"]
+    _Heading: TypeAlias = Literal["twist", "x", "y", "z"]
+    _Ground: TypeAlias = Literal["y", "z"]
+    _Axis: TypeAlias = Literal["x", "y", "z"]
     _Order: TypeAlias = Literal["xyzw", "wxyz"]
     _Progress: TypeAlias = Callable[[int, int], object] | Any
 
@@ -181,6 +188,29 @@ class Skipped:
     clip: str | None
     code: str | None
     message: str
+
+
+@dataclass(frozen=True, slots=True)
+class _Mirrored:
+    """Which clips of a library are mirrored, the index of the axis from left to right, and the partner of each joint."""
+
+    clips: NDArray[np.bool_]
+    axis: int
+    pairs: list[int]
+
+    def arrays(self) -> dict[str, Any]:
+        """Everything, as arrays of a file."""
+        pairs = np.array(self.pairs, np.int64)
+        return {"mirrored": self.clips, "mirror_axis": np.array(self.axis), "mirror_pairs": pairs}
+
+    @classmethod
+    def of_arrays(cls, arrays: dict[str, Any], clips: int, parents: list[int | None]) -> _Mirrored | None:
+        if "mirrored" not in arrays:
+            return None
+        mask, axis, pairs = (np.asarray(arrays.get(name, ())) for name in ("mirrored", "mirror_axis", "mirror_pairs"))
+        if mask.dtype != np.bool_ or mask.shape != (clips,) or axis.shape or axis not in (0, 1, 2) or pairs.dtype.kind != "i":
+            raise InputError(f"arrays: mirrored is not that of {clips} clips")
+        return cls(mask, int(axis), joint_partners([], parents, pairs.clip(min=0).tolist()))
 
 
 @dataclass(slots=True)
@@ -333,6 +363,9 @@ class MotionLibrary(Generic[_A]):
         }
         self._file: str | None = None
         self._only: NDArray[np.int64] | None = None
+        # The indices in the library's file.
+        self._in_file: NDArray[np.int64] | None = None
+        self._mirrored: _Mirrored | None = None
         self._put_on(device)
 
     @overload
@@ -499,6 +532,8 @@ class MotionLibrary(Generic[_A]):
             )
         if device is None or (isinstance(device, str) and device.lower() == "cpu"):
             return
+        if self._mirrored is not None:
+            raise InputError("device: mirror images are computed on the CPU; open the library without `device`")
         self._device = device if isinstance(device, Engine) else Engine(device)
         self._on_device = DeviceMotions(self._motions, self._device)
 
@@ -533,6 +568,47 @@ class MotionLibrary(Generic[_A]):
         part._skipped_indices = [index // processes for index, _ in skipped]
         return part
 
+    def with_mirrored(self, axis: _Axis, *, pairs: Sequence[int] | None = None) -> MotionLibrary[_A]:
+        """These clips, and behind them the mirror image of each, in the same order: the image of clip `i` is clip
+        `len(library) + i`. The memory is shared, not copied. States are mirrored when they are sampled, as
+        `features.mirrored_positions` and `features.mirrored_rotations` mirror them: at the plane through the origin across
+        `axis`, "x", "y" or "z", the axis from left to right. `pairs`: the partner of each joint on the other side, by default
+        by the words for sides in the names (`features.mirror_pairs`). Joints have to be arranged symmetrically in the tree, and
+        their axes at rest have to be mirror images, as those of SMPL and BVH are; for other skeletons, make clips by
+        `Clip.mirrored`. So do for clips with scalars such as a robot's angles, which are refused here. Contacts change their
+        sides by their names.
+
+        >>> import tumble
+        >>> half = 0.5 ** 0.5
+        >>> wave = tumble.Clip([0.0], [[0, 0, 0, 1], [half, half, 0, 0], [0, 0, 0, 1]], layout="track", name="wave",
+        ...                    names=["spine", "left_arm", "right_arm"], parents=[None, 0, 0])
+        >>> both = tumble.MotionLibrary([wave]).with_mirrored("x")
+        >>> both.names, both.sample(1, 0.0).rotations[2].round(2)
+        (['wave', 'wave (mirrored)'], array([ 0.71, -0.71, -0.  ,  0.  ], dtype=float32))
+        """
+        axes = ("x", "y", "z")
+        if axis not in axes:
+            raise InputError(f"axis: there is no `{axis}`; there are {', '.join(axes)}")
+        if self._device is not None:
+            raise InputError("with_mirrored: mirror images are computed on the CPU; use a library without `device`")
+        if self._mirrored is not None:
+            raise InputError("with_mirrored: the library has mirror images already")
+        if self.dof_names:
+            raise InputError(
+                f"with_mirrored: the library has scalars ({self.dof_names[0]}), whose signs depend on the axes of a robot's"
+                " joints; add clips that `Clip.mirrored(axis, robot=…)` makes"
+            )
+        partners = joint_partners(self.joint_names, self._motions.parents, None if pairs is None else list(pairs))
+        both = self._part(np.tile(np.arange(len(self)), 2))
+        are_mirrored = np.arange(2 * len(self)) >= len(self)
+        return both._mark(_Mirrored(are_mirrored, axes.index(axis), partners))
+
+    def _mark(self, mirrored: _Mirrored) -> MotionLibrary[_A]:
+        """Marks clips as mirror images."""
+        self._mirrored = mirrored
+        self.names = [f"{name} (mirrored)" if image else name for name, image in zip(self.names, mirrored.clips)]
+        return self
+
     def _part(self, clips: NDArray[np.int64]) -> MotionLibrary[_A]:
         """Some clips, by their indices, in the same memory."""
         part: MotionLibrary[_A] = MotionLibrary.__new__(MotionLibrary)
@@ -541,6 +617,9 @@ class MotionLibrary(Generic[_A]):
         part.paths = [self.paths[index] for index in clips]
         part.lengths, part.rates, part._shard_indices = self.lengths[clips], self.rates[clips], self._shard_indices[clips]
         part._only = self._ids(clips)
+        part._in_file = clips if self._in_file is None else self._in_file[clips]
+        if self._mirrored is not None:
+            part._mirrored = replace(self._mirrored, clips=self._mirrored.clips[clips])
         return part
 
     def _ids(self, ids: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -570,6 +649,8 @@ class MotionLibrary(Generic[_A]):
         finite: bool = ...,
         order: _Order = ...,
         rotations: _Representation = ...,
+        heading: _Heading | None = ...,
+        up: _Ground | None = ...,
         out: None = ...,
     ) -> _Whole[_A]: ...
 
@@ -583,6 +664,8 @@ class MotionLibrary(Generic[_A]):
         finite: bool = ...,
         order: _Order = ...,
         rotations: _Representation = ...,
+        heading: _Heading | None = ...,
+        up: _Ground | None = ...,
         out: None = ...,
     ) -> _Rotations[_A]: ...
 
@@ -596,6 +679,8 @@ class MotionLibrary(Generic[_A]):
         finite: bool = ...,
         order: _Order = ...,
         rotations: _Representation = ...,
+        heading: _Heading | None = ...,
+        up: _Ground | None = ...,
         out: None = ...,
     ) -> _Positions[_A]: ...
 
@@ -609,6 +694,8 @@ class MotionLibrary(Generic[_A]):
         finite: bool = ...,
         order: _Order = ...,
         rotations: _Representation = ...,
+        heading: _Heading | None = ...,
+        up: _Ground | None = ...,
         out: None = ...,
     ) -> _WorldRotations[_A]: ...
 
@@ -622,6 +709,8 @@ class MotionLibrary(Generic[_A]):
         finite: bool = ...,
         order: _Order = ...,
         rotations: _Representation = ...,
+        heading: _Heading | None = ...,
+        up: _Ground | None = ...,
         out: None = ...,
     ) -> _Velocities[_A]: ...
 
@@ -635,6 +724,8 @@ class MotionLibrary(Generic[_A]):
         finite: bool = ...,
         order: _Order = ...,
         rotations: _Representation = ...,
+        heading: _Heading | None = ...,
+        up: _Ground | None = ...,
         out: None = ...,
     ) -> _AngularVelocities[_A]: ...
 
@@ -648,6 +739,8 @@ class MotionLibrary(Generic[_A]):
         finite: bool = ...,
         order: _Order = ...,
         rotations: _Representation = ...,
+        heading: _Heading | None = ...,
+        up: _Ground | None = ...,
         out: None = ...,
     ) -> _Some[_A]: ...
 
@@ -661,6 +754,8 @@ class MotionLibrary(Generic[_A]):
         finite: bool = ...,
         order: _Order = ...,
         rotations: _Representation = ...,
+        heading: _Heading | None = ...,
+        up: _Ground | None = ...,
         out: _S,
     ) -> _S: ...
 
@@ -673,6 +768,8 @@ class MotionLibrary(Generic[_A]):
         finite: bool = False,
         order: _Order = "xyzw",
         rotations: _Representation = "quaternion",
+        heading: _Heading | None = None,
+        up: _Ground | None = None,
         out: MotionState[Any] | None = None,
     ) -> MotionState[Any]:
         """The states of instances: `clip_ids` has the clip of each instance, and `times` its time, in seconds after the clip's
@@ -687,8 +784,15 @@ class MotionLibrary(Generic[_A]):
         how both arrays of rotations are stored: "quaternion" (…, 4), "matrix" (…, 3, 3) for column vectors, "6d" (…, 6),
         the first two columns of the matrix (`six-columns` of docs/features.md), or "rotvec" (…, 3), axis times angle.
 
-        A library on a device returns new `DeviceArray`s: `out`, `order` and `rotations` are for the CPU alone. `clip_ids`
-        and `times` are read by the host; arrays of a device are copied to it first.
+        `heading`: states in the heading frame of the root, the first joint without a parent, instead of the world. The frame
+        is on the ground below the root, and has its heading: "twist", or that of its axis "x", "y" or "z", as
+        `features.heading`. `up`: the axis that points up, "y" or "z", which is needed then. Positions, velocities and
+        rotations in the world, and the `rotations` of roots, are expressed in the frame; the root is in place, as
+        `features.root_motion` computes it. Velocities stay those of the world: the frame does not move.
+
+        A library on a device returns new `DeviceArray`s, with `rotations` "quaternion", "matrix" or "6d"; `out`, `order`
+        and `heading` are for the CPU alone. `clip_ids` and `times` are read by the host; arrays of a device are copied to it
+        first.
 
         >>> import tumble
         >>> door = tumble.Clip([0.0, 2.0], [[[0, 0, 0, 1], [0, 0, 1, 0]]], parents=[None])
@@ -697,14 +801,43 @@ class MotionLibrary(Generic[_A]):
         (1, 1, 3)
         >>> library.sample(0, [0.5, 1.0], rotations="6d").rotations.shape
         (2, 1, 6)
+        >>> library.sample(0, 0.5, arrays=["rotations"], heading="twist", up="z").rotations[0, 3]
+        np.float32(1.0)
         """
+        keywords: dict[str, Any] = {
+            "arrays": arrays,
+            "finite": finite,
+            "order": order,
+            "rotations": rotations,
+            "out": out,
+        }
+        return self._sampled(clip_ids, times, frames=(heading, up, 1), **keywords)
+
+    def _sampled(
+        self,
+        clip_ids: ArrayLike,
+        times: ArrayLike,
+        *,
+        arrays: Sequence[_Name] | None,
+        finite: bool,
+        order: _Order,
+        rotations: _Representation,
+        frames: tuple[str | None, str | None, int],
+        out: MotionState[Any] | None,
+    ) -> MotionState[Any]:
+        """The states of instances. `frames`: the heading, the axis that points up, and how many states after one another have
+        the heading frame of the first of them."""
+        heading, up, window = frames
+        if (heading is None) != (up is None):
+            raise InputError('heading and up: give both, such as heading="twist", up="z", or neither')
         ids, moments = _indices("clip_ids", clip_ids), _numbers("times", times, "seconds")
         try:
             shape = np.broadcast_shapes(ids.shape, moments.shape)
         except ValueError:
             shapes = f"{ids.shape} and {moments.shape}"
             raise InputError(f"clip_ids and times: their shapes are {shapes}; give shapes that broadcast") from None
-        ids = self._ids(np.ascontiguousarray(np.broadcast_to(ids, shape), np.int64).reshape(-1))
+        listed = np.ascontiguousarray(np.broadcast_to(ids, shape), np.int64).reshape(-1)
+        ids = self._ids(listed)
         moments = np.ascontiguousarray(np.broadcast_to(moments, shape)).reshape(-1)
         each = {name: (self._motions.joints, *of) for name, of in _shapes_of(order, rotations).items()}
         each |= {name: (len(self._scalars[_kind(name)].names),) for name in _SCALARS}
@@ -716,12 +849,13 @@ class MotionLibrary(Generic[_A]):
             if name in _SCALARS:
                 self._check_scalars(name)
         if self._device is not None:
-            if out is not None or order != "xyzw" or rotations != "quaternion":
+            if out is not None or order != "xyzw" or rotations == "rotvec" or heading is not None:
                 raise InputError(
-                    "out, order and rotations: a library on a device makes new arrays of quaternions x y z w; leave them out,"
-                    " and convert on the device, or use a library without `device`"
+                    "out, order, heading and rotvec: a library on a device makes new arrays in the world, of quaternions"
+                    " x y z w, matrices or 6d; leave them out, and convert on the device, or use a library without `device`"
                 )
-            return self._sampled_on_device(ids, moments, shape, _NAMES if arrays is None else tuple(arrays), finite)
+            names = _NAMES if arrays is None else tuple(arrays)
+            return self._sampled_on_device(ids, moments, shape, names, rotations, finite)
         if out is None:
             every = (*_NAMES, *(name for name in _SCALARS if self._scalars[_kind(name)].names))
             asked = every if arrays is None else arrays
@@ -736,26 +870,44 @@ class MotionLibrary(Generic[_A]):
                     self._check_scalars(name)
             _check_out(out, shape, each)
         filled = _flat(out, len(shape))
-        if rotations == "quaternion":
-            self._fill(ids, moments, finite, filled)
-        else:
-            found = MotionState(
-                **{
-                    name: _aligned((ids.size, self._motions.joints, 4)) if name.endswith("rotations") else array
-                    for name in _NAMES
-                    if (array := getattr(filled, name)) is not None
-                }
-            )
-            self._fill(ids, moments, finite, found)
-            for of, array in ((found.rotations, filled.rotations), (found.world_rotations, filled.world_rotations)):
-                if of is not None and array is not None:
-                    represent(self._engine, of, rotations, array)
+        # Quaternions that the result does not have, or has in another representation.
+        quaternions = {
+            name: _aligned((ids.size, self._motions.joints, 4))
+            for name in ("rotations", "world_rotations")
+            if getattr(filled, name) is not None and rotations != "quaternion"
+        }
+        if heading is not None and filled.rotations is None and filled.world_rotations is None:
+            quaternions["rotations"] = _aligned((ids.size, self._motions.joints, 4))
+        found = replace(filled, **quaternions)
+        self._fill(ids, moments, finite, found)
+        self._reframe(found, listed, None if heading is None else (str(up), heading, self._motions.parents, window))
+        for of, array in ((found.rotations, filled.rotations), (found.world_rotations, filled.world_rotations)):
+            if of is not None and array is not None and of is not array:
+                represent(self._engine, of, rotations, array)
         if order == "wxyz":
             for array in (out.rotations, out.world_rotations):
                 if array is not None:
                     put_w_first(array)
         self._fill_scalars(ids, moments, finite, filled)
+        if self._mirrored is not None and filled.contacts is not None:
+            of_mirrored = self._mirrored.clips[listed]
+            sides = np.array(mirror_pairs(self.contact_names), np.int64)
+            filled.contacts[of_mirrored] = filled.contacts[of_mirrored][:, sides]
         return out
+
+    def _reframe(
+        self,
+        state: MotionState,
+        clip_ids: NDArray[np.int64],
+        heading: tuple[str, str, list[int | None], int] | None,
+    ) -> None:
+        """States of mirrored clips become mirror images; then all are expressed in heading frames."""
+        mirror = None
+        if self._mirrored is not None:
+            mirror = (self._mirrored.clips[clip_ids], self._mirrored.axis, self._mirrored.pairs)
+        if mirror is not None or heading is not None:
+            arrays = (state.rotations, state.positions, state.world_rotations, state.velocities, state.angular_velocities)
+            reframe(arrays, self._motions.joints, mirror, heading)
 
     def _check_scalars(self, name: str) -> None:
         """Refuses arrays of scalars that a library does not have."""
@@ -801,12 +953,13 @@ class MotionLibrary(Generic[_A]):
         moments: NDArray[np.float64],
         shape: tuple[int, ...],
         names: Sequence[str],
+        rotations: str,
         finite: bool,
     ) -> MotionState[DeviceArray]:
         """The arrays with these names, in memory of the device."""
         frames = self._frames(ids) if finite and any(name.endswith("velocities") for name in names) else None
         names = list(dict.fromkeys(names))
-        found = self._on_device.sample(ids, moments, shape, names, frames)
+        found = self._on_device.sample(ids, moments, shape, names, rotations, frames)
         return MotionState(**dict(zip(names, found, strict=True)))
 
     def _fill(
@@ -840,6 +993,8 @@ class MotionLibrary(Generic[_A]):
         finite: bool = ...,
         order: _Order = ...,
         rotations: _Representation = ...,
+        heading: _Heading | None = ...,
+        up: _Ground | None = ...,
         out: None = ...,
     ) -> _Whole[_A]: ...
 
@@ -855,6 +1010,8 @@ class MotionLibrary(Generic[_A]):
         finite: bool = ...,
         order: _Order = ...,
         rotations: _Representation = ...,
+        heading: _Heading | None = ...,
+        up: _Ground | None = ...,
         out: None = ...,
     ) -> _Rotations[_A]: ...
 
@@ -870,6 +1027,8 @@ class MotionLibrary(Generic[_A]):
         finite: bool = ...,
         order: _Order = ...,
         rotations: _Representation = ...,
+        heading: _Heading | None = ...,
+        up: _Ground | None = ...,
         out: None = ...,
     ) -> _Positions[_A]: ...
 
@@ -885,6 +1044,8 @@ class MotionLibrary(Generic[_A]):
         finite: bool = ...,
         order: _Order = ...,
         rotations: _Representation = ...,
+        heading: _Heading | None = ...,
+        up: _Ground | None = ...,
         out: None = ...,
     ) -> _WorldRotations[_A]: ...
 
@@ -900,6 +1061,8 @@ class MotionLibrary(Generic[_A]):
         finite: bool = ...,
         order: _Order = ...,
         rotations: _Representation = ...,
+        heading: _Heading | None = ...,
+        up: _Ground | None = ...,
         out: None = ...,
     ) -> _Velocities[_A]: ...
 
@@ -915,6 +1078,8 @@ class MotionLibrary(Generic[_A]):
         finite: bool = ...,
         order: _Order = ...,
         rotations: _Representation = ...,
+        heading: _Heading | None = ...,
+        up: _Ground | None = ...,
         out: None = ...,
     ) -> _AngularVelocities[_A]: ...
 
@@ -930,6 +1095,8 @@ class MotionLibrary(Generic[_A]):
         finite: bool = ...,
         order: _Order = ...,
         rotations: _Representation = ...,
+        heading: _Heading | None = ...,
+        up: _Ground | None = ...,
         out: None = ...,
     ) -> _Some[_A]: ...
 
@@ -945,6 +1112,8 @@ class MotionLibrary(Generic[_A]):
         finite: bool = ...,
         order: _Order = ...,
         rotations: _Representation = ...,
+        heading: _Heading | None = ...,
+        up: _Ground | None = ...,
         out: _S,
     ) -> _S: ...
 
@@ -959,10 +1128,13 @@ class MotionLibrary(Generic[_A]):
         finite: bool = False,
         order: _Order = "xyzw",
         rotations: _Representation = "quaternion",
+        heading: _Heading | None = None,
+        up: _Ground | None = None,
         out: MotionState[Any] | None = None,
     ) -> MotionState[Any]:
         """`count` states of each instance, from the time `starts` on, `fps` a second: arrays (…, count, joints, …) for
-        `clip_ids` and `starts` of the shape (…). Other keywords are those of `sample`.
+        `clip_ids` and `starts` of the shape (…). Other keywords are those of `sample`. With `heading`, all states of a window
+        are in the heading frame of its first state. For the frame of each state, use `sample`.
 
         >>> import tumble
         >>> door = tumble.Clip([0.0, 2.0], [[[0, 0, 0, 1], [0, 0, 1, 0]]], parents=[None])
@@ -975,13 +1147,14 @@ class MotionLibrary(Generic[_A]):
             raise InputError(f"fps: {fps} is no rate greater than 0")
         ids, first = _indices("clip_ids", clip_ids)[..., None], _numbers("starts", starts, "seconds")[..., None]
         times = first + np.arange(count) / rate
-        keywords: dict[str, Any] = {"finite": finite, "order": order, "rotations": rotations}
-        if arrays is not None:
-            keywords["arrays"] = arrays
-        if out is not None:
-            keywords["out"] = out
-        found: MotionState[Any] = self.sample(ids, times, **keywords)
-        return found
+        keywords: dict[str, Any] = {
+            "arrays": arrays,
+            "finite": finite,
+            "order": order,
+            "rotations": rotations,
+            "out": out,
+        }
+        return self._sampled(ids, times, frames=(heading, up, count), **keywords)
 
     def draw(
         self,
@@ -1134,13 +1307,17 @@ class MotionLibrary(Generic[_A]):
         self._file = file
         self.skipped = []
         self._skipped_indices = []
-        self._only = np.asarray(arrays["only"]) if "only" in arrays else None
+        self._only = _indices("only", arrays["only"]) if "only" in arrays else None
+        self._in_file = None
+        self._mirrored = _Mirrored.of_arrays(arrays, clips, self._motions.parents)
+        if self._only is not None and self._only.shape != (clips,) or self._mirrored is not None and self._only is None:
+            raise InputError(f"{file or 'arrays'}: its indices are not those of {clips} clips")
         self._put_on(device)
         return self
 
     def _arrays(self) -> dict[str, Any]:
         about = {
-            "version": np.array(_VERSION),
+            "version": np.array(_VERSION if self._mirrored is not None else _VERSION - 1),
             "method": np.array(self._method),
             "names": np.array(self.names, dtype=np.str_),
             "paths": np.array(self.paths, dtype=np.str_),
@@ -1150,6 +1327,11 @@ class MotionLibrary(Generic[_A]):
             "joint_names": np.array(self.joint_names, dtype=np.str_),
         }
         unplaced, only = self._motions.unplaced, None if self._only is None else self._only.tolist()
+        if self._mirrored is not None and self._only is not None:
+            # A clip and its mirror image have the same memory.
+            kept, about["only"] = np.unique(self._only, return_inverse=True)
+            only = kept.tolist()
+            about |= self._mirrored.arrays()
         if only is not None and unplaced:
             unplaced = [unplaced[index] for index in only]
         about["unplaced"] = np.array(unplaced, dtype=np.str_)
@@ -1160,8 +1342,8 @@ class MotionLibrary(Generic[_A]):
     def __reduce__(self) -> tuple[Any, ...]:
         if self._file is not None:
             # The file has the indices of all clips.
-            shard_indices = None if self._only is None else self._shard_indices
-            return _opened, (self._file, self._engine, self._only, self._device, shard_indices)
+            state = (None, None) if self._in_file is None else (self._shard_indices, self._mirrored)
+            return _opened, (self._file, self._engine, self._in_file, self._device, *state)
         return MotionLibrary._of_arrays, (self._arrays(), self._engine, None, self._device)
 
     def __len__(self) -> int:
@@ -1286,13 +1468,16 @@ def _flat(state: MotionState, axes: int) -> MotionState:
 def _opened(
     file: str,
     engine: Engine,
-    only: NDArray[np.int64] | None = None,
+    in_file: NDArray[np.int64] | None = None,
     device: Engine | None = None,
     shard_indices: NDArray[np.int64] | None = None,
+    mirrored: _Mirrored | None = None,
 ) -> MotionLibrary[Any]:
     library: MotionLibrary[Any] = MotionLibrary.open(file, engine=engine, device=device)
-    if only is not None and library._only is None:
-        library = library._part(only)
+    if in_file is not None:
+        library = library._part(in_file)
+    if mirrored is not None and library._mirrored is None:
+        library._mark(mirrored)
     if shard_indices is not None:
         library._shard_indices = shard_indices
     return library

@@ -110,6 +110,7 @@ _Encoding: TypeAlias = Literal[
     "axis-angle",
     "matrix",
     "matrix-3x4",
+    "6d",
     "euler",
 ]
 _EndFrame: TypeAlias = Literal["key", "hold", "leave-out"]
@@ -1387,6 +1388,15 @@ def scalar_motions(
 ) -> tuple[Motions | None, list[str], list[int], str | None]: ...
 def put_w_first(quaternions: _Single) -> None: ...
 def represent(engine: Engine, rotations: _Single, kind: str, out: _Single) -> None: ...
+def joint_partners(
+    names: Sequence[str], parents: Sequence[int | None], pairs: Sequence[int] | None
+) -> list[int]: ...
+def reframe(
+    arrays: tuple[_Single | None, _Single | None, _Single | None, _Single | None, _Single | None],
+    joints: int,
+    mirror: tuple[NDArray[np.bool_], int, Sequence[int]] | None,
+    heading: tuple[str, str, Sequence[int | None], int] | None,
+) -> None: ...
 def clip_of_state(state: dict[str, Any]) -> Clip: ...
 def file_of_state(
     path: _Path, clips: Sequence[Clip], refused: Sequence[str]
@@ -1412,6 +1422,8 @@ class Motions:
     def joints(self) -> int: ...
     @property
     def joint_names(self) -> list[str]: ...
+    @property
+    def parents(self) -> list[int | None]: ...
     @property
     def unplaced(self) -> list[str]: ...
     @property
@@ -1440,6 +1452,7 @@ class DeviceMotions:
         times: NDArray[np.float64],
         shape: Sequence[int],
         names: Sequence[str],
+        rotations: str,
         frames: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None,
     ) -> list[DeviceArray]: ...
 

@@ -139,7 +139,8 @@ pub(crate) fn trials(kernel: Kernel, random: &mut Random) -> Vec<Trial> {
         Kernel::MotionJoints
         | Kernel::MotionWalk
         | Kernel::MotionDifferences
-        | Kernel::MotionStore => motion::trials(kernel, random),
+        | Kernel::MotionStore
+        | Kernel::MotionMatrices => motion::trials(kernel, random),
         _ => segments::trials(kernel, random),
     }
 }

@@ -6,6 +6,7 @@ use crate::shader::{
     CHANNELS, CrowdBase, CrowdChannel, CrowdClip, CrowdLink, CrowdSpan, FORM_ARC, FORM_CONSTANT,
     FORM_CUBIC, FORM_KEYS, FORM_LINE, FORM_PACKED, FORM_POLYNOMIAL, Kernel, MotionDispatch,
     MotionSample, ON_KEY, POSITION, POWERS, ROTATION, STATE_VECTORS,
+    WORLD_ROTATION,
 };
 
 use super::random::Random;
@@ -22,6 +23,7 @@ pub(super) fn trials(kernel: Kernel, random: &mut Random) -> Vec<Trial> {
         Kernel::MotionJoints => vec![joints(random, 0), joints(random, 1)],
         Kernel::MotionWalk => vec![walk(random, 0), walk(random, 1)],
         Kernel::MotionDifferences => vec![differences(random)],
+        Kernel::MotionMatrices => vec![matrices(random, 6, 1), matrices(random, 9, 0)],
         _ => vec![stored(random)],
     }
 }
@@ -171,6 +173,19 @@ fn stored(random: &mut Random) -> Trial {
     let dispatch = MotionDispatch {
         vector: POSITION,
         numbers: NUMBERS,
+        ..arguments(count, 0)
+    };
+    let states = states(random, INSTANCES);
+    Trial::new([bytes(&states)], &dispatch, groups(count as usize, false))
+}
+
+/// Matrices of rotations in the world, or so many numbers of them.
+fn matrices(random: &mut Random, numbers: u32, detail: u32) -> Trial {
+    let count = INSTANCES * JOINTS;
+    let dispatch = MotionDispatch {
+        vector: WORLD_ROTATION,
+        numbers,
+        detail,
         ..arguments(count, 0)
     };
     let states = states(random, INSTANCES);
