@@ -436,7 +436,7 @@ static WHOLE_READS: [Read; 6] = [
 ];
 
 /// Kernels over the states of a library's clips, each with the files that it needs beside the entry point.
-const MOTION: [(&str, &[&str]); 4] = [
+const MOTION: [(&str, &[&str]); 6] = [
     (
         "joints",
         &[
@@ -477,6 +477,18 @@ const MOTION: [(&str, &[&str]); 4] = [
         ],
     ),
     ("store", &["motion/store"]),
+    (
+        "tree",
+        &[
+            "math/sine_cosine",
+            "math/arc_tangent",
+            "math/quaternion",
+            "math/vector",
+            "math/turned",
+            "motion/tree",
+        ],
+    ),
+    ("pick", &["motion/pick"]),
 ];
 
 /// The files of the self-test.

@@ -25,6 +25,7 @@ pub(crate) enum Global {
     FirstEntry,
     FoundParameters,
     FoundSpans,
+    Frames,
     FromLayer,
     Gathered,
     Halves,
@@ -38,6 +39,7 @@ pub(crate) enum Global {
     Local,
     Matrices,
     Mixed,
+    Picks,
     Positions,
     Probes,
     Rates,
@@ -54,6 +56,7 @@ pub(crate) enum Global {
     Tile,
     TimeBases,
     ToLayer,
+    Tracks,
     Values,
     Visible,
     Weights,
@@ -80,6 +83,7 @@ impl Global {
         Self::FirstEntry,
         Self::FoundParameters,
         Self::FoundSpans,
+        Self::Frames,
         Self::FromLayer,
         Self::Gathered,
         Self::Halves,
@@ -93,6 +97,7 @@ impl Global {
         Self::Local,
         Self::Matrices,
         Self::Mixed,
+        Self::Picks,
         Self::Positions,
         Self::Probes,
         Self::Rates,
@@ -109,6 +114,7 @@ impl Global {
         Self::Tile,
         Self::TimeBases,
         Self::ToLayer,
+        Self::Tracks,
         Self::Values,
         Self::Visible,
         Self::Weights,
@@ -116,13 +122,13 @@ impl Global {
     ];
 }
 
-pub(crate) const GLOBALS: usize = 50;
+pub(crate) const GLOBALS: usize = 53;
 
 /// Variables of which each invocation has its own.
 pub(crate) const PRIVATE: [Global; 1] = [Global::FirstEntry];
 
 /// The variables that kernels bind, in the order of the bindings.
-const BOUND: [&[Global]; 29] = [
+const BOUND: [&[Global]; 31] = [
     &[Global::Probes, Global::Replies],
     &[
         Global::Segments,
@@ -248,6 +254,8 @@ const BOUND: [&[Global]; 29] = [
     &[Global::Links, Global::States],
     &[Global::Rates, Global::States],
     &[Global::States, Global::Values],
+    &[Global::Frames, Global::Tracks, Global::States],
+    &[Global::Picks, Global::States, Global::Values],
     &[Global::Keys, Global::Intervals, Global::Rotations],
 ];
 
@@ -266,32 +274,32 @@ const fn entry(
 }
 
 /// The entry points: those of the kernels in their order, and then those that read texel buffers.
-pub(crate) static ENTRIES: [Entry; 199] = [
+pub(crate) static ENTRIES: [Entry; 201] = [
     entry(0, None, 64, None),
-    entry(1, Some(Global::Dispatch), 64, Some(144)),
-    entry(1, Some(Global::Dispatch), 64, Some(145)),
     entry(1, Some(Global::Dispatch), 64, Some(146)),
     entry(1, Some(Global::Dispatch), 64, Some(147)),
     entry(1, Some(Global::Dispatch), 64, Some(148)),
     entry(1, Some(Global::Dispatch), 64, Some(149)),
     entry(1, Some(Global::Dispatch), 64, Some(150)),
     entry(1, Some(Global::Dispatch), 64, Some(151)),
-    entry(2, Some(Global::Dispatch), 64, Some(152)),
-    entry(2, Some(Global::Dispatch), 64, Some(153)),
+    entry(1, Some(Global::Dispatch), 64, Some(152)),
+    entry(1, Some(Global::Dispatch), 64, Some(153)),
     entry(2, Some(Global::Dispatch), 64, Some(154)),
     entry(2, Some(Global::Dispatch), 64, Some(155)),
     entry(2, Some(Global::Dispatch), 64, Some(156)),
     entry(2, Some(Global::Dispatch), 64, Some(157)),
     entry(2, Some(Global::Dispatch), 64, Some(158)),
     entry(2, Some(Global::Dispatch), 64, Some(159)),
-    entry(3, Some(Global::Dispatch), 64, Some(160)),
-    entry(3, Some(Global::Dispatch), 64, Some(161)),
+    entry(2, Some(Global::Dispatch), 64, Some(160)),
+    entry(2, Some(Global::Dispatch), 64, Some(161)),
     entry(3, Some(Global::Dispatch), 64, Some(162)),
     entry(3, Some(Global::Dispatch), 64, Some(163)),
     entry(3, Some(Global::Dispatch), 64, Some(164)),
     entry(3, Some(Global::Dispatch), 64, Some(165)),
     entry(3, Some(Global::Dispatch), 64, Some(166)),
     entry(3, Some(Global::Dispatch), 64, Some(167)),
+    entry(3, Some(Global::Dispatch), 64, Some(168)),
+    entry(3, Some(Global::Dispatch), 64, Some(169)),
     entry(4, Some(Global::Dispatch), 64, None),
     entry(4, Some(Global::Dispatch), 64, None),
     entry(4, Some(Global::Dispatch), 64, None),
@@ -324,30 +332,30 @@ pub(crate) static ENTRIES: [Entry; 199] = [
     entry(2, Some(Global::Dispatch), 128, None),
     entry(2, Some(Global::Dispatch), 128, None),
     entry(2, Some(Global::Dispatch), 128, None),
-    entry(1, Some(Global::Dispatch), 64, Some(168)),
-    entry(1, Some(Global::Dispatch), 64, Some(169)),
     entry(1, Some(Global::Dispatch), 64, Some(170)),
     entry(1, Some(Global::Dispatch), 64, Some(171)),
     entry(1, Some(Global::Dispatch), 64, Some(172)),
     entry(1, Some(Global::Dispatch), 64, Some(173)),
     entry(1, Some(Global::Dispatch), 64, Some(174)),
     entry(1, Some(Global::Dispatch), 64, Some(175)),
-    entry(2, Some(Global::Dispatch), 64, Some(176)),
-    entry(2, Some(Global::Dispatch), 64, Some(177)),
+    entry(1, Some(Global::Dispatch), 64, Some(176)),
+    entry(1, Some(Global::Dispatch), 64, Some(177)),
     entry(2, Some(Global::Dispatch), 64, Some(178)),
     entry(2, Some(Global::Dispatch), 64, Some(179)),
     entry(2, Some(Global::Dispatch), 64, Some(180)),
     entry(2, Some(Global::Dispatch), 64, Some(181)),
     entry(2, Some(Global::Dispatch), 64, Some(182)),
     entry(2, Some(Global::Dispatch), 64, Some(183)),
-    entry(3, Some(Global::Dispatch), 64, Some(184)),
-    entry(3, Some(Global::Dispatch), 64, Some(185)),
+    entry(2, Some(Global::Dispatch), 64, Some(184)),
+    entry(2, Some(Global::Dispatch), 64, Some(185)),
     entry(3, Some(Global::Dispatch), 64, Some(186)),
     entry(3, Some(Global::Dispatch), 64, Some(187)),
     entry(3, Some(Global::Dispatch), 64, Some(188)),
     entry(3, Some(Global::Dispatch), 64, Some(189)),
     entry(3, Some(Global::Dispatch), 64, Some(190)),
     entry(3, Some(Global::Dispatch), 64, Some(191)),
+    entry(3, Some(Global::Dispatch), 64, Some(192)),
+    entry(3, Some(Global::Dispatch), 64, Some(193)),
     entry(4, Some(Global::Dispatch), 64, None),
     entry(4, Some(Global::Dispatch), 64, None),
     entry(4, Some(Global::Dispatch), 64, None),
@@ -380,19 +388,19 @@ pub(crate) static ENTRIES: [Entry; 199] = [
     entry(2, Some(Global::Dispatch), 128, None),
     entry(2, Some(Global::Dispatch), 128, None),
     entry(2, Some(Global::Dispatch), 128, None),
-    entry(6, Some(Global::Rows), 64, Some(192)),
-    entry(6, Some(Global::Rows), 64, Some(193)),
-    entry(7, Some(Global::Rows), 64, Some(194)),
+    entry(6, Some(Global::Rows), 64, Some(194)),
+    entry(6, Some(Global::Rows), 64, Some(195)),
+    entry(7, Some(Global::Rows), 64, Some(196)),
     entry(8, Some(Global::Dispatch), 64, None),
     entry(9, Some(Global::Dispatch), 64, None),
     entry(10, Some(Global::Dispatch), 64, None),
     entry(11, Some(Global::Dispatch), 64, None),
     entry(12, Some(Global::Dispatch), 64, None),
     entry(13, Some(Global::Dispatch), 64, None),
-    entry(14, Some(Global::Dispatch), 64, Some(195)),
-    entry(14, Some(Global::Dispatch), 64, Some(196)),
     entry(14, Some(Global::Dispatch), 64, Some(197)),
     entry(14, Some(Global::Dispatch), 64, Some(198)),
+    entry(14, Some(Global::Dispatch), 64, Some(199)),
+    entry(14, Some(Global::Dispatch), 64, Some(200)),
     entry(15, Some(Global::Dispatch), 64, None),
     entry(16, Some(Global::Dispatch), 64, None),
     entry(17, Some(Global::Dispatch), 64, None),
@@ -411,6 +419,8 @@ pub(crate) static ENTRIES: [Entry; 199] = [
     entry(26, Some(Global::Dispatch), 64, None),
     entry(27, Some(Global::Dispatch), 64, None),
     entry(28, Some(Global::Dispatch), 64, None),
+    entry(29, Some(Global::Dispatch), 64, None),
+    entry(30, Some(Global::Dispatch), 64, None),
     entry(1, Some(Global::Dispatch), 64, None),
     entry(1, Some(Global::Dispatch), 64, None),
     entry(1, Some(Global::Dispatch), 64, None),
@@ -779,6 +789,21 @@ pub(crate) struct TangentWeights<F> {
 stored!(TangentWeights, (<F>), 4, before 0, after 1, outgoing 2, kind 3);
 
 #[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct TreeFrame<F> {
+    pub(crate) offset: [F; 3],
+    pub(crate) above: u32,
+    pub(crate) rest: [F; 4],
+    pub(crate) axis: [F; 3],
+    pub(crate) kind: u32,
+    pub(crate) source: u32,
+    pub(crate) root: u32,
+    pub(crate) multiplier: F,
+    pub(crate) shift: F,
+}
+
+stored!(TreeFrame, (<F>), 16, offset 0, above 3, rest 4, axis 8, kind 11, source 12, root 13, multiplier 14, shift 15);
+
+#[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct TwoKeysHoisted<F> {
     pub(crate) parameter: F,
 }
@@ -1007,14 +1032,14 @@ pub(crate) fn canonical_product<M: Machine>(
 }
 
 pub(crate) fn cell_at<M: Machine>(machine: &M, index: u32) -> [M::F; 4] {
-    const OF_KERNELS: [u8; 199] = [
+    const OF_KERNELS: [u8; 201] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1,
     ];
     match OF_KERNELS[machine.code()] {
         0 => cell_at_of_readers(machine, index),
@@ -1058,14 +1083,14 @@ pub(crate) fn cell_of<M: Machine>(machine: &M, corner: Corner, iteration: u32) -
 }
 
 pub(crate) fn channel_at<M: Machine>(machine: &M, index: u32) -> CrowdChannel {
-    const OF_KERNELS: [u8; 199] = [
+    const OF_KERNELS: [u8; 201] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1,
     ];
     match OF_KERNELS[machine.code()] {
         0 => channel_at_of_readers(machine, index),
@@ -1124,14 +1149,14 @@ pub(crate) fn composed<M: Machine>(
 }
 
 pub(crate) fn constant_at<M: Machine>(machine: &M, index: u32) -> [M::F; 4] {
-    const OF_KERNELS: [u8; 199] = [
+    const OF_KERNELS: [u8; 201] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1,
         1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
-        1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0,
+        1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => constant_at_of_readers(machine, index),
@@ -1266,14 +1291,14 @@ pub(crate) fn cross3<M: Machine>(machine: &M, a: [M::F; 3], b: [M::F; 3]) -> [M:
 }
 
 pub(crate) fn crowd_work<M: Machine>(machine: &M, index: u32) {
-    const OF_KERNELS: [u8; 199] = [
+    const OF_KERNELS: [u8; 201] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 1, 1, 2, 3, 4, 5, 0, 6, 7, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1,
     ];
     match OF_KERNELS[machine.code()] {
         0 => crowd_work_of_rotations(machine, index),
@@ -1508,14 +1533,14 @@ pub(crate) fn cubic_value<M: Machine>(
     channel: CrowdChannel,
     at: CrowdPosition<M::F>,
 ) -> [M::F; 4] {
-    const OF_KERNELS: [u8; 199] = [
+    const OF_KERNELS: [u8; 201] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => cubic_value_of_plain_cubic(machine, channel, at),
@@ -1608,14 +1633,14 @@ pub(crate) fn cubic_value_of_cubic_or_constant<M: Machine>(
 }
 
 pub(crate) fn distance_at<M: Machine>(machine: &M, index: u32) -> M::F {
-    const OF_KERNELS: [u8; 199] = [
+    const OF_KERNELS: [u8; 201] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1,
-        1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1,
+        1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => distance_at_of_readers(machine, index),
@@ -1641,14 +1666,14 @@ pub(crate) fn distance_at_of_readers_2<M: Machine>(machine: &M, index: u32) -> M
 }
 
 pub(crate) fn distance_from_middle<M: Machine>(machine: &M, first: i32, j: u32) -> M::F {
-    const OF_KERNELS: [u8; 199] = [
+    const OF_KERNELS: [u8; 201] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0,
         0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1,
         1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1,
-        1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1,
+        1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => distance_from_middle_of_frame_distance(machine, first, j),
@@ -1691,14 +1716,14 @@ pub(crate) fn dot4<M: Machine>(machine: &M, a: [M::F; 4], b: [M::F; 4]) -> M::F 
 }
 
 pub(crate) fn entry_at<M: Machine>(machine: &M, index: u32) -> CrowdEntry {
-    const OF_KERNELS: [u8; 199] = [
+    const OF_KERNELS: [u8; 201] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 2, 2, 2, 2,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 2, 2, 2, 2,
     ];
     match OF_KERNELS[machine.code()] {
         0 => entry_at_of_readers(machine, index),
@@ -2013,14 +2038,14 @@ pub(crate) async fn finish_2<M: Machine>(
     rotation: [M::F; 4],
     is_stored: bool,
 ) {
-    const OF_KERNELS: [u8; 199] = [
+    const OF_KERNELS: [u8; 201] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 2,
         3, 0, 1, 0, 1, 0, 0, 2, 3, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 2, 3, 0, 1, 0,
         1, 0, 0, 2, 3, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => finish_2_of_alone(machine, lane, index, rotation, is_stored).await,
@@ -2440,14 +2465,14 @@ pub(crate) async fn is_any<M: Machine>(machine: &M, condition: bool) -> bool {
 }
 
 pub(crate) fn item_at_item<M: Machine>(machine: &M, index: u32) -> Item<M::F> {
-    const OF_KERNELS: [u8; 199] = [
+    const OF_KERNELS: [u8; 201] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1,
-        1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
-        1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1,
+        1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
+        1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => item_at_item_of_readers(machine, index),
@@ -2672,14 +2697,14 @@ pub(crate) fn layer_value<M: Machine>(
 }
 
 pub(crate) fn layered<M: Machine>(machine: &M, instance: u32, joint: u32, kind: u32) -> [M::F; 4] {
-    const OF_KERNELS: [u8; 199] = [
+    const OF_KERNELS: [u8; 201] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 1, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 1,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 1,
     ];
     match OF_KERNELS[machine.code()] {
         0 => layered_of_layers(machine, instance, joint, kind),
@@ -2842,15 +2867,15 @@ pub(crate) fn magnitude<M: Machine>(machine: &M, x: M::F) -> M::F {
 }
 
 pub(crate) async fn main<M: Machine>(machine: &M) {
-    const OF_KERNELS: [u8; 199] = [
+    const OF_KERNELS: [u8; 201] = [
         0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 2, 2, 2, 2, 2, 2, 2, 2, 3, 3, 3, 3, 3,
         3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 4, 5, 4, 4, 6, 7, 4, 5, 4, 5, 4, 4, 6, 7, 4, 5, 8, 8, 8,
         8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 9, 9, 9, 9, 9, 9, 9, 9, 10, 10, 10, 10, 10, 10, 10,
         10, 10, 10, 10, 10, 10, 10, 10, 10, 11, 12, 11, 11, 13, 14, 11, 12, 11, 12, 11, 11, 13, 14,
         11, 12, 15, 16, 17, 18, 18, 18, 18, 18, 18, 19, 19, 19, 19, 19, 19, 19, 19, 20, 19, 19, 21,
-        21, 22, 22, 23, 23, 24, 24, 24, 24, 25, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 2,
-        2, 2, 2, 2, 2, 2, 2, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 9, 9, 9, 9, 9, 9, 9,
-        9, 15, 16, 17, 19, 19, 19, 19,
+        21, 22, 22, 23, 23, 24, 24, 24, 24, 24, 24, 25, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
+        1, 1, 2, 2, 2, 2, 2, 2, 2, 2, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 9, 9, 9, 9,
+        9, 9, 9, 9, 15, 16, 17, 19, 19, 19, 19,
     ];
     match OF_KERNELS[machine.code()] {
         0 => main_of_self_test(machine).await,
@@ -5378,7 +5403,7 @@ pub(crate) async fn main_of_subgroup_rotations<M: Machine>(machine: &M) {
             let _block = machine.block(line!(), 13);
             let loaded_26 = index;
             let loaded_27 = index;
-            let result_4 = rotation_at(machine, in_subgroup, loaded_27).await;
+            let result_4 = rotation_at_subgroup(machine, in_subgroup, loaded_27).await;
             store(machine, output.wrapping_add(loaded_26), result_4);
             let loaded_28 = index;
             index = loaded_28.wrapping_add(lanes);
@@ -5394,7 +5419,7 @@ pub(crate) async fn main_of_subgroup_rotations<M: Machine>(machine: &M) {
         let loaded_30 = index;
         let is_inside_2 = loaded_30 < end;
         let loaded_31 = index;
-        let value = rotation_at(
+        let value = rotation_at_subgroup(
             machine,
             in_subgroup,
             if is_inside_2 { loaded_31 } else { 0u32 },
@@ -5497,20 +5522,22 @@ pub(crate) fn matrix_rows<M: Machine>(
 }
 
 pub(crate) fn motion_work<M: Machine>(machine: &M, index: u32) {
-    const OF_KERNELS: [u8; 199] = [
+    const OF_KERNELS: [u8; 201] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 2, 3, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 2, 3, 4, 5, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => motion_work_of_joints(machine, index),
         1 => motion_work_of_walk(machine, index),
         2 => motion_work_of_differences(machine, index),
-        _ => motion_work_of_store(machine, index),
+        3 => motion_work_of_store(machine, index),
+        4 => motion_work_of_tree(machine, index),
+        _ => motion_work_of_pick(machine, index),
     }
 }
 
@@ -5675,6 +5702,59 @@ pub(crate) fn motion_work_of_store<M: Machine>(machine: &M, index: u32) {
     machine.store::<u32>(Global::Values, index as usize, loaded_4);
 }
 
+/// `index` is the sample, `dispatch.joints` the number of tracks and `dispatch.links` that of frames.
+pub(crate) fn motion_work_of_tree<M: Machine>(machine: &M, index: u32) {
+    let mut i: u32 = 0u32;
+    let _block = machine.block(line!(), 5);
+    let loaded = machine.load::<u32>(Global::Dispatch, 2);
+    let first_word = index.wrapping_mul(loaded).wrapping_mul(20u32);
+    let loaded_2 = machine.load::<u32>(Global::Dispatch, 3);
+    let first = index.wrapping_mul(loaded_2);
+    loop {
+        let _block = machine.block(line!(), 13);
+        let loaded_3 = i;
+        let loaded_4 = machine.load::<u32>(Global::Dispatch, 3);
+        if !(loaded_3 < loaded_4) {
+            break;
+        }
+        let loaded_5 = i;
+        let loaded_6 = machine.load::<TreeFrame<M::F>>(Global::Frames, 16 * (loaded_5 as usize));
+        let loaded_7 = i;
+        walk_to(
+            machine,
+            loaded_6,
+            first_word,
+            first,
+            first.wrapping_add(loaded_7).wrapping_mul(STATE_VECTORS),
+        );
+        let loaded_8 = i;
+        i = loaded_8.wrapping_add(1u32);
+    }
+}
+
+/// `index` is a number of the result. Of each sample there are `dispatch.numbers`; their picks begin at `dispatch.vector`,
+/// and its states have `dispatch.joints` vectors.
+pub(crate) fn motion_work_of_pick<M: Machine>(machine: &M, index: u32) {
+    let _block = machine.block(line!(), 14);
+    let loaded = machine.load::<u32>(Global::Dispatch, 7);
+    let sample = quotient(index, loaded);
+    let loaded_2 = machine.load::<u32>(Global::Dispatch, 6);
+    let loaded_3 = machine.load::<u32>(Global::Dispatch, 7);
+    let pick = machine.load::<u32>(
+        Global::Picks,
+        loaded_2.wrapping_add(index.wrapping_sub(sample.wrapping_mul(loaded_3))) as usize,
+    );
+    let loaded_4 = machine.load::<u32>(Global::Dispatch, 2);
+    let loaded_5 = machine.load::<u32>(
+        Global::States,
+        sample
+            .wrapping_mul(loaded_4)
+            .wrapping_mul(4u32)
+            .wrapping_add(pick) as usize,
+    );
+    machine.store::<u32>(Global::Values, index as usize, loaded_5);
+}
+
 /// Stores the position and the velocity in the parent's frame.
 pub(crate) fn move_joint<M: Machine>(
     machine: &M,
@@ -5829,14 +5909,14 @@ pub(crate) fn moving_span<M: Machine>(
 }
 
 pub(crate) fn near_distance<M: Machine>(machine: &M, at: i32) -> M::F {
-    const OF_KERNELS: [u8; 199] = [
+    const OF_KERNELS: [u8; 201] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => near_distance_of_near_frame(machine, at),
@@ -5894,14 +5974,14 @@ pub(crate) fn parameter_in<M: Machine>(machine: &M, span: CrowdSpan<M::F>, tick:
 }
 
 pub(crate) fn parts_1<M: Machine>(machine: &M, rotation: [M::F; 4]) -> [M::F; 3] {
-    const OF_KERNELS: [u8; 199] = [
+    const OF_KERNELS: [u8; 201] = [
         0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 2, 0, 0, 0,
         0, 0, 1, 0, 2, 0, 0, 0, 0, 0, 1, 0, 2, 0, 0, 0, 0, 0, 1, 0, 2, 0, 0, 0, 0, 0, 1, 0, 0, 0,
         0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 2, 0, 0, 0, 0, 0, 1, 0,
         2, 0, 0, 0, 0, 0, 1, 0, 2, 0, 0, 0, 0, 0, 1, 0, 2, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0,
-        0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0,
+        0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => parts_1_of_euler(machine, rotation),
@@ -5931,14 +6011,14 @@ pub(crate) fn parts_1_of_euler_2<M: Machine>(machine: &M, rotation: [M::F; 4]) -
 }
 
 pub(crate) fn parts_2<M: Machine>(machine: &M, rotation: [M::F; 4]) -> [M::F; 9] {
-    const OF_KERNELS: [u8; 199] = [
+    const OF_KERNELS: [u8; 201] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1,
         0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0,
         0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => parts_2_of_matrix3x3(machine, rotation),
@@ -5999,14 +6079,14 @@ pub(crate) fn parts_2_of_matrix3x3_2<M: Machine>(machine: &M, rotation: [M::F; 4
 }
 
 pub(crate) fn parts_3<M: Machine>(machine: &M, rotation: [M::F; 4]) -> [[M::F; 4]; 3] {
-    const OF_KERNELS: [u8; 199] = [
+    const OF_KERNELS: [u8; 201] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0,
         0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => parts_3_of_matrix3x4(machine, rotation),
@@ -6155,14 +6235,14 @@ pub(crate) fn polynomial<M: Machine>(machine: &M, c: [[M::F; 4]; 11], s: M::F) -
 }
 
 pub(crate) fn pose<M: Machine>(machine: &M, sample: u32) {
-    const OF_KERNELS: [u8; 199] = [
+    const OF_KERNELS: [u8; 201] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 2, 3,
         4, 5, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => pose_of_add(machine, sample),
@@ -6384,14 +6464,14 @@ pub(crate) fn pose_of_world<M: Machine>(machine: &M, sample: u32) {
 }
 
 pub(crate) fn position_at<M: Machine>(machine: &M, index: u32) -> CrowdPosition<M::F> {
-    const OF_KERNELS: [u8; 199] = [
+    const OF_KERNELS: [u8; 201] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 2, 2, 2, 2,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 2, 2, 2, 2,
     ];
     match OF_KERNELS[machine.code()] {
         0 => position_at_of_readers(machine, index),
@@ -6723,8 +6803,15 @@ pub(crate) fn rotation_added<M: Machine>(
     result_4
 }
 
+pub(crate) fn rotation_at_2<M: Machine>(machine: &M, word: u32) -> [M::F; 4] {
+    let _block = machine.block(line!(), 3);
+    let result = vector_at(machine, word);
+    let loaded = machine.load::<M::F>(Global::Tracks, word.wrapping_add(3u32) as usize);
+    [result[0], result[1], result[2], loaded]
+}
+
 /// The rotation of a joint, of those of all instances of the subgroup.
-pub(crate) async fn rotation_at<M: Machine>(
+pub(crate) async fn rotation_at_subgroup<M: Machine>(
     machine: &M,
     here: Subgroup<M::F>,
     index: u32,
@@ -6920,14 +7007,14 @@ pub(crate) fn row_product<M: Machine>(
 }
 
 pub(crate) fn sample_at_key_sample<M: Machine>(machine: &M, index: u32) -> KeySample<M::F> {
-    const OF_KERNELS: [u8; 199] = [
+    const OF_KERNELS: [u8; 201] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => sample_at_key_sample_of_readers(machine, index),
@@ -6962,14 +7049,14 @@ pub(crate) fn sample_at_key_sample_of_readers_2<M: Machine>(
 }
 
 pub(crate) fn sample_at_listed_sample<M: Machine>(machine: &M, index: u32) -> ListedSample<M::F> {
-    const OF_KERNELS: [u8; 199] = [
+    const OF_KERNELS: [u8; 201] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => sample_at_listed_sample_of_readers(machine, index),
@@ -7149,14 +7236,14 @@ pub(crate) fn sampled<M: Machine>(
 }
 
 pub(crate) fn segment_at_arc_segment<M: Machine>(machine: &M, index: u32) -> ArcSegment<M::F> {
-    const OF_KERNELS: [u8; 199] = [
+    const OF_KERNELS: [u8; 201] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1,
-        1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1,
+        1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => segment_at_arc_segment_of_readers(machine, index),
@@ -7192,14 +7279,14 @@ pub(crate) fn segment_at_polynomial_segment<M: Machine>(
     machine: &M,
     index: u32,
 ) -> PolynomialSegment<M::F> {
-    const OF_KERNELS: [u8; 199] = [
+    const OF_KERNELS: [u8; 201] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
-        1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
+        1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => segment_at_polynomial_segment_of_readers(machine, index),
@@ -7754,14 +7841,14 @@ pub(crate) fn step_vector<M: Machine>(machine: &M, a: [M::F; 4], chord: [M::F; 4
 }
 
 pub(crate) fn store<M: Machine>(machine: &M, index: u32, rotation: [M::F; 4]) {
-    const OF_KERNELS: [u8; 199] = [
+    const OF_KERNELS: [u8; 201] = [
         0, 0, 1, 2, 3, 4, 5, 6, 1, 0, 1, 2, 3, 4, 5, 6, 1, 0, 1, 2, 3, 4, 5, 6, 1, 0, 1, 2, 3, 4,
         5, 6, 1, 0, 1, 2, 3, 4, 5, 6, 1, 0, 1, 2, 3, 4, 5, 6, 1, 0, 1, 2, 3, 4, 5, 6, 1, 0, 1, 2,
         3, 4, 5, 6, 1, 0, 1, 2, 3, 4, 5, 6, 1, 0, 1, 2, 3, 4, 5, 6, 1, 0, 1, 2, 3, 4, 5, 6, 1, 0,
         1, 2, 3, 4, 5, 6, 1, 0, 1, 2, 3, 4, 5, 6, 1, 0, 1, 2, 3, 4, 5, 6, 1, 3, 3, 3, 0, 0, 0, 0,
-        0, 0, 3, 3, 3, 3, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 3, 2, 0, 0, 0, 0, 0, 0, 1, 2, 7, 4, 5,
-        6, 1, 0, 1, 2, 7, 4, 5, 6, 1, 0, 1, 2, 7, 4, 5, 6, 1, 0, 1, 2, 7, 4, 5, 6, 1, 0, 1, 2, 7,
-        4, 5, 6, 1, 0, 1, 2, 7, 4, 5, 6, 1, 7, 7, 7, 7, 7, 7, 7,
+        0, 0, 3, 3, 3, 3, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 3, 2, 0, 0, 0, 0, 0, 0, 0, 0, 1, 2, 7,
+        4, 5, 6, 1, 0, 1, 2, 7, 4, 5, 6, 1, 0, 1, 2, 7, 4, 5, 6, 1, 0, 1, 2, 7, 4, 5, 6, 1, 0, 1,
+        2, 7, 4, 5, 6, 1, 0, 1, 2, 7, 4, 5, 6, 1, 7, 7, 7, 7, 7, 7, 7,
     ];
     match OF_KERNELS[machine.code()] {
         0 => store_of_axis_angle(machine, index, rotation),
@@ -7898,14 +7985,14 @@ pub(crate) fn store_with_care<M: Machine>(
     first_j: u32,
     repetition: u32,
 ) {
-    const OF_KERNELS: [u8; 199] = [
+    const OF_KERNELS: [u8; 201] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 1, 0, 1, 1, 0, 0, 1, 0, 1, 0, 1, 1, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => store_with_care_of_alone(machine, item, location, first_j, repetition),
@@ -8076,14 +8163,14 @@ pub(crate) fn store_with_care_of_alone_2<M: Machine>(
 }
 
 pub(crate) fn tick_of<M: Machine>(machine: &M, entry: CrowdEntry, period: u32) -> u32 {
-    const OF_KERNELS: [u8; 199] = [
+    const OF_KERNELS: [u8; 201] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => tick_of_of_ticks(machine, entry, period),
@@ -8382,6 +8469,32 @@ pub(crate) fn transform_row<M: Machine>(
     result
 }
 
+/// The rotation by an angle, up to 8192 rad in magnitude, about a unit axis.
+pub(crate) fn turned<M: Machine>(machine: &M, axis: [M::F; 3], angle: M::F) -> [M::F; 4] {
+    let _block = machine.block(line!(), 23);
+    let half = angle * M::F::of(0.5);
+    let shifted = half * M::F::of(QUARTERS_PER_RADIAN) + M::F::of(WHOLE_SHIFT);
+    let quarters = shifted.bits();
+    let whole = shifted - M::F::of(WHOLE_SHIFT);
+    let rest = ((half - whole * M::F::of(QUARTER_1)) - whole * M::F::of(QUARTER_2))
+        - whole * M::F::of(QUARTER_3);
+    let sines = sine_cosine(machine, rest);
+    let is_odd = quarters & 1u32 == 1u32;
+    let sign = if quarters & 2u32 == 2u32 {
+        M::F::of(-1.0)
+    } else {
+        M::F::of(1.0)
+    };
+    let sine = (if is_odd { sines[1] } else { sines[0] }) * sign;
+    let cosine = (if is_odd { -sines[0] } else { sines[1] }) * sign;
+    [
+        both(axis, [sine; 3], |x, y| x * y)[0],
+        both(axis, [sine; 3], |x, y| x * y)[1],
+        both(axis, [sine; 3], |x, y| x * y)[2],
+        cosine,
+    ]
+}
+
 pub(crate) fn unpacked<M: Machine>(machine: &M, words: [u32; 2]) -> [M::F; 4] {
     let _block = machine.block(line!(), 30);
     let a = packed_component(machine, words[0]);
@@ -8490,6 +8603,14 @@ pub(crate) fn value_and_slope<M: Machine>(
     }
 }
 
+pub(crate) fn vector_at<M: Machine>(machine: &M, word: u32) -> [M::F; 3] {
+    let _block = machine.block(line!(), 5);
+    let loaded = machine.load::<M::F>(Global::Tracks, word as usize);
+    let loaded_2 = machine.load::<M::F>(Global::Tracks, word.wrapping_add(1u32) as usize);
+    let loaded_3 = machine.load::<M::F>(Global::Tracks, word.wrapping_add(2u32) as usize);
+    [loaded, loaded_2, loaded_3]
+}
+
 /// Makes the matrix of a joint one in the model, where its parent's is one.
 pub(crate) fn walk<M: Machine>(machine: &M, instance: u32, link: CrowdLink) {
     let _block = machine.block(line!(), 26);
@@ -8525,15 +8646,187 @@ pub(crate) fn walk<M: Machine>(machine: &M, instance: u32, link: CrowdLink) {
     );
 }
 
+/// Stores the state of a frame, which comes after the frame above it.
+pub(crate) fn walk_to<M: Machine>(
+    machine: &M,
+    frame: TreeFrame<M::F>,
+    first_word: u32,
+    first: u32,
+    state: u32,
+) {
+    let mut above: [M::F; 4] = [M::F::of(0.0), M::F::of(0.0), M::F::of(0.0), M::F::of(1.0)];
+    let mut from_root: [M::F; 3] = [M::F::of(0.0); 3];
+    let mut velocity_above: [M::F; 3] = [M::F::of(0.0); 3];
+    let mut angular_above: [M::F; 3] = [M::F::of(0.0); 3];
+    let mut arm: [M::F; 3] = Default::default();
+    let mut rotation: [M::F; 4] = Default::default();
+    let mut linear: [M::F; 3] = [M::F::of(0.0); 3];
+    let mut angular: [M::F; 3] = [M::F::of(0.0); 3];
+    let mut rate: M::F = M::F::of(0.0);
+    let mut in_world: [M::F; 4] = Default::default();
+    let _block = machine.block(line!(), 38);
+    let loaded = machine.load::<u32>(Global::Dispatch, 4);
+    let moves = loaded != 0u32;
+    if frame.above != NO_FRAME {
+        let _block = machine.block(line!(), 10);
+        let parent = first.wrapping_add(frame.above).wrapping_mul(STATE_VECTORS);
+        let loaded_2 = machine.load::<[M::F; 4]>(
+            Global::States,
+            4 * (parent.wrapping_add(WORLD_ROTATION) as usize),
+        );
+        above = loaded_2;
+        let loaded_3 = machine.load::<[M::F; 4]>(
+            Global::States,
+            4 * (parent.wrapping_add(FROM_ROOT) as usize),
+        );
+        from_root = [loaded_3[0], loaded_3[1], loaded_3[2]];
+        if moves {
+            let _block = machine.block(line!(), 8);
+            let loaded_4 = machine
+                .load::<[M::F; 4]>(Global::States, 4 * (parent.wrapping_add(VELOCITY) as usize));
+            velocity_above = [loaded_4[0], loaded_4[1], loaded_4[2]];
+            let loaded_5 = machine.load::<[M::F; 4]>(
+                Global::States,
+                4 * (parent.wrapping_add(ANGULAR_VELOCITY) as usize),
+            );
+            angular_above = [loaded_5[0], loaded_5[1], loaded_5[2]];
+        }
+    }
+    let word = first_word.wrapping_add(frame.source);
+    let loaded_6 = above;
+    let axes = product(machine, loaded_6, frame.rest);
+    let loaded_7 = above;
+    let result = rotated(machine, loaded_7, frame.offset);
+    arm = result;
+    rotation = axes;
+    if (frame.kind == FRAME_HINGE) | (frame.kind == FRAME_SLIDE) {
+        let _block = machine.block(line!(), 6);
+        let loaded_8 = machine.load::<M::F>(Global::Tracks, word as usize);
+        let value = frame.multiplier * loaded_8 + frame.shift;
+        if moves {
+            let _block = machine.block(line!(), 4);
+            let loaded_9 =
+                machine.load::<M::F>(Global::Tracks, word.wrapping_add(VECTOR_WORDS) as usize);
+            rate = frame.multiplier * loaded_9;
+        }
+        if frame.kind == FRAME_HINGE {
+            let _block = machine.block(line!(), 6);
+            let result_2 = turned(machine, frame.axis, value);
+            let result_3 = product(machine, axes, result_2);
+            rotation = result_3;
+            let loaded_10 = rate;
+            angular = both(frame.axis, [loaded_10; 3], |x, y| x * y);
+        } else {
+            let _block = machine.block(line!(), 8);
+            let loaded_11 = arm;
+            let result_4 = rotated(machine, axes, both(frame.axis, [value; 3], |x, y| x * y));
+            arm = both(loaded_11, result_4, |x, y| x + y);
+            let loaded_12 = rate;
+            linear = both(frame.axis, [loaded_12; 3], |x, y| x * y);
+        }
+    } else {
+        let _block = machine.block(line!(), 2);
+        if frame.kind != FRAME_FIXED {
+            let _block = machine.block(line!(), 7);
+            let result_5 = rotation_at_2(machine, word.wrapping_add(4u32));
+            let result_6 = product(machine, axes, result_5);
+            rotation = result_6;
+            if frame.kind == FRAME_FREE {
+                let _block = machine.block(line!(), 6);
+                let loaded_13 = arm;
+                let result_7 = vector_at(machine, word.wrapping_add(8u32));
+                let result_8 = rotated(machine, axes, result_7);
+                arm = both(loaded_13, result_8, |x, y| x + y);
+            }
+            if moves {
+                let _block = machine.block(line!(), 5);
+                let result_9 = vector_at(machine, word.wrapping_add(16u32));
+                angular = result_9;
+                if frame.kind != FRAME_BALL {
+                    let _block = machine.block(line!(), 3);
+                    let result_10 = vector_at(machine, word.wrapping_add(12u32));
+                    linear = result_10;
+                }
+            }
+        }
+    }
+    let loaded_14 = rotation;
+    let loaded_15 = rotation;
+    let result_11 = dot4(machine, loaded_14, loaded_15);
+    let scale = M::F::of(1.5) - M::F::of(0.5) * result_11;
+    let loaded_16 = rotation;
+    let result_12 = canonical(machine, both(loaded_16, [scale; 4], |x, y| x * y));
+    machine.store::<[M::F; 4]>(
+        Global::States,
+        4 * (state.wrapping_add(WORLD_ROTATION) as usize),
+        result_12,
+    );
+    let loaded_17 = from_root;
+    let loaded_18 = arm;
+    let position = canonical3(machine, both(loaded_17, loaded_18, |x, y| x + y));
+    machine.store::<[M::F; 4]>(
+        Global::States,
+        4 * (state.wrapping_add(FROM_ROOT) as usize),
+        position,
+    );
+    in_world = position;
+    if frame.root != NO_FRAME {
+        let _block = machine.block(line!(), 7);
+        let root = vector_at(
+            machine,
+            first_word.wrapping_add(frame.root).wrapping_add(8u32),
+        );
+        let result_13 = canonical3(
+            machine,
+            both([position[0], position[1], position[2]], root, |x, y| x + y),
+        );
+        in_world = result_13;
+    }
+    let loaded_19 = in_world;
+    machine.store::<[M::F; 4]>(
+        Global::States,
+        4 * (state.wrapping_add(POSITION) as usize),
+        loaded_19,
+    );
+    if moves {
+        let _block = machine.block(line!(), 18);
+        let loaded_20 = velocity_above;
+        let loaded_21 = angular_above;
+        let loaded_22 = arm;
+        let result_14 = cross3(machine, loaded_21, loaded_22);
+        let carried = both(loaded_20, result_14, |x, y| x + y);
+        let loaded_23 = linear;
+        let result_15 = rotated(machine, axes, loaded_23);
+        let result_16 = canonical3(machine, both(carried, result_15, |x, y| x + y));
+        machine.store::<[M::F; 4]>(
+            Global::States,
+            4 * (state.wrapping_add(VELOCITY) as usize),
+            result_16,
+        );
+        let loaded_24 = angular_above;
+        let loaded_25 = angular;
+        let result_17 = rotated(machine, axes, loaded_25);
+        let result_18 = canonical3(machine, both(loaded_24, result_17, |x, y| x + y));
+        machine.store::<[M::F; 4]>(
+            Global::States,
+            4 * (state.wrapping_add(ANGULAR_VELOCITY) as usize),
+            result_18,
+        );
+        return;
+    } else {
+        return;
+    }
+}
+
 pub(crate) fn weights_at<M: Machine>(machine: &M, index: u32) -> TangentWeights<M::F> {
-    const OF_KERNELS: [u8; 199] = [
+    const OF_KERNELS: [u8; 201] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => weights_at_of_readers(machine, index),

@@ -68,7 +68,14 @@ pub(crate) const FORM_KEYS: u32 = 16;
 pub(crate) const FORM_LINE: u32 = 18;
 pub(crate) const FORM_PACKED: u32 = 17;
 pub(crate) const FORM_POLYNOMIAL: u32 = 3;
+pub(crate) const FRAME_BALL: u32 = 3;
+pub(crate) const FRAME_FIXED: u32 = 0;
+pub(crate) const FRAME_FREE: u32 = 4;
+pub(crate) const FRAME_HINGE: u32 = 1;
+pub(crate) const FRAME_ROOT: u32 = 5;
+pub(crate) const FRAME_SLIDE: u32 = 2;
 pub(crate) const FROM_KEYS_WORKGROUP: u32 = 64;
+pub(crate) const FROM_ROOT: u32 = 0;
 pub(crate) const GIMBAL: f32 = 2.5e-7;
 pub(crate) const HALF_INFINITE: u32 = 31744;
 pub(crate) const HALF_OVERFLOW: u32 = 1199566848;
@@ -103,6 +110,7 @@ pub(crate) const MAY_BE_TINY: u32 = 1073741824;
 pub(crate) const MOTION_WORKGROUP: u32 = 64;
 pub(crate) const NEEDS_CARE: u32 = 1073741824;
 pub(crate) const NEGATIVE: u32 = 128;
+pub(crate) const NO_FRAME: u32 = 4294967295;
 pub(crate) const NO_KEY: u32 = 4294967295;
 pub(crate) const ON_KEY: u32 = 2147483648;
 pub(crate) const PACKED_STEP: f32 = 1.3487017e-6;
@@ -111,6 +119,10 @@ pub(crate) const PI_LOW: f32 = -8.742278e-8;
 pub(crate) const POSE_WORKGROUP: u32 = 64;
 pub(crate) const POSITION: u32 = 2;
 pub(crate) const PREPARE_WORKGROUP: u32 = 64;
+pub(crate) const QUARTERS_PER_RADIAN: f32 = 0.63661975;
+pub(crate) const QUARTER_1: f32 = 1.5703125;
+pub(crate) const QUARTER_2: f32 = 0.0004837513;
+pub(crate) const QUARTER_3: f32 = 7.54979e-8;
 pub(crate) const QUARTER_COSINE_2: f32 = -0.5;
 pub(crate) const QUARTER_COSINE_4: f32 = 0.041666646;
 pub(crate) const QUARTER_COSINE_6: f32 = -0.0013887301;
@@ -164,8 +176,10 @@ pub(crate) const TICKS: u32 = 2147483647;
 pub(crate) const TINY_BITS: u32 = 528482304;
 pub(crate) const TRANSLATION: u32 = 1;
 pub(crate) const TWO_THIRDS: f32 = 0.6666667;
+pub(crate) const VECTOR_WORDS: u32 = 4;
 pub(crate) const VELOCITY: u32 = 3;
 pub(crate) const WEIGHT_UNIT: f32 = 3.0517578e-5;
+pub(crate) const WHOLE_SHIFT: f32 = 12582912.0;
 pub(crate) const WORKGROUP: u32 = 64;
 pub(crate) const WORLD_ROTATION: u32 = 1;
 pub(crate) const WRAP_HOLD: u32 = 0;
@@ -836,6 +850,40 @@ const _: () = {
     assert!(std::mem::offset_of!(TangentWeights, outgoing) == 8);
     assert!(std::mem::offset_of!(TangentWeights, kind) == 12);
 };
+#[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub(crate) struct TreeFrame {
+/// The position in the frame above.
+    pub(crate) offset: [f32; 3],
+/// The index of the frame above, or NO_FRAME.
+    pub(crate) above: u32,
+/// The rotation in the frame above, before the joint moves it.
+    pub(crate) rest: [f32; 4],
+/// The unit axis of a hinge or a slide, after `rest`.
+    pub(crate) axis: [f32; 3],
+/// How it moves: a FRAME_….
+    pub(crate) kind: u32,
+/// Where the states of a sample's tracks have its motion, in words: the coordinate of a hinge or a slide, else the
+/// first word of its track.
+    pub(crate) source: u32,
+/// The first word of the track whose position is added last, or NO_FRAME.
+    pub(crate) root: u32,
+/// A hinge turns by `multiplier * coordinate + shift`, a slide is moved so far.
+    pub(crate) multiplier: f32,
+    pub(crate) shift: f32,
+}
+const _: () = {
+    assert!(size_of::<TreeFrame>() == 64);
+    assert!(std::mem::offset_of!(TreeFrame, offset) == 0);
+    assert!(std::mem::offset_of!(TreeFrame, above) == 12);
+    assert!(std::mem::offset_of!(TreeFrame, rest) == 16);
+    assert!(std::mem::offset_of!(TreeFrame, axis) == 32);
+    assert!(std::mem::offset_of!(TreeFrame, kind) == 44);
+    assert!(std::mem::offset_of!(TreeFrame, source) == 48);
+    assert!(std::mem::offset_of!(TreeFrame, root) == 52);
+    assert!(std::mem::offset_of!(TreeFrame, multiplier) == 56);
+    assert!(std::mem::offset_of!(TreeFrame, shift) == 60);
+};
 /// A kernel, by its name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Kernel {
@@ -982,6 +1030,8 @@ pub(crate) enum Kernel {
     MotionWalk,
     MotionDifferences,
     MotionStore,
+    MotionTree,
+    MotionPick,
     PrepareArcs,
 }
 /// How the work over segments is listed.
@@ -1126,7 +1176,7 @@ impl Kernel {
         }
     }
 }
-pub(crate) static KERNELS: [KernelCode; 144] = [
+pub(crate) static KERNELS: [KernelCode; 146] = [
     KernelCode { kernel: Kernel::SelfTest, storage: ("self_test", 1946), texels: None, converting: None, bindings: &[Read, Write], segments: None, subgroups: false },
     KernelCode { kernel: Kernel::ArcFramesAxisAngle, storage: ("arc_frames_axis_angle", 2963), texels: Some(("arc_frames_axis_angle_texels", 3089)), converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::Frames, Store::AxisAngle)), subgroups: false },
     KernelCode { kernel: Kernel::ArcFramesEuler, storage: ("arc_frames_euler", 3619), texels: Some(("arc_frames_euler_texels", 3737)), converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::Frames, Store::Euler)), subgroups: false },
@@ -1270,5 +1320,7 @@ pub(crate) static KERNELS: [KernelCode; 144] = [
     KernelCode { kernel: Kernel::MotionWalk, storage: ("motion_walk", 3912), texels: None, converting: None, bindings: &[Read, ReadWrite], segments: None, subgroups: false },
     KernelCode { kernel: Kernel::MotionDifferences, storage: ("motion_differences", 3595), texels: None, converting: None, bindings: &[Read, ReadWrite], segments: None, subgroups: false },
     KernelCode { kernel: Kernel::MotionStore, storage: ("motion_store", 625), texels: None, converting: None, bindings: &[Read, Write], segments: None, subgroups: false },
+    KernelCode { kernel: Kernel::MotionTree, storage: ("motion_tree", 5053), texels: None, converting: None, bindings: &[Read, Read, ReadWrite], segments: None, subgroups: false },
+    KernelCode { kernel: Kernel::MotionPick, storage: ("motion_pick", 683), texels: None, converting: None, bindings: &[Read, Read, Write], segments: None, subgroups: false },
     KernelCode { kernel: Kernel::PrepareArcs, storage: ("prepare_arcs", 1870), texels: None, converting: None, bindings: &[Read, Read, Write], segments: None, subgroups: false },
 ];

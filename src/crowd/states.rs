@@ -29,7 +29,7 @@ use crate::twin::crowd_times::position_at;
 use crate::twin::quaternion::rotated;
 
 /// The number of instances in a task.
-const TASK: usize = 64;
+pub(super) const TASK: usize = 64;
 
 /// The number of spans that are tried before they are searched.
 const GUESSES: usize = 6;
@@ -557,7 +557,7 @@ struct StateScratch {
 
 /// Scratch memory for one pose.
 #[derive(Default)]
-struct PoseScratch {
+pub(super) struct PoseScratch {
     /// The clip of the previous pose, and the positions of its time bases.
     clip: Option<u32>,
     positions: Vec<CrowdPosition>,
@@ -567,13 +567,21 @@ struct PoseScratch {
     arcs: [Vec<[f32; 4]>; 2],
 }
 
+impl PoseScratch {
+    pub(super) fn resize(&mut self, joints: usize) {
+        for memory in self.keys.iter_mut().chain(&mut self.arcs) {
+            memory.resize(joints, [0.0; 4]);
+        }
+    }
+}
+
 /// A joint in the world.
 #[derive(Clone, Copy, Default)]
-struct Joint {
-    rotation: [f32; 4],
-    position: [f32; 3],
-    velocity: [f32; 3],
-    angular_velocity: [f32; 3],
+pub(super) struct Joint {
+    pub(super) rotation: [f32; 4],
+    pub(super) position: [f32; 3],
+    pub(super) velocity: [f32; 3],
+    pub(super) angular_velocity: [f32; 3],
 }
 
 /// Some instances.
@@ -590,7 +598,7 @@ struct StatesTask<'a, 'b> {
 
 /// Which values of a pose are computed.
 #[derive(Clone, Copy, PartialEq, PartialOrd)]
-enum PoseValues {
+pub(super) enum PoseValues {
     /// Rotations in the parents' frames.
     Rotations,
     /// Rotations and positions in the world, too.
@@ -626,9 +634,7 @@ impl InLanes for StatesTask<'_, '_> {
         for joints_of in [&mut *world].into_iter().chain(&mut *ends) {
             joints_of.resize(joints, Joint::default());
         }
-        for memory in pose.keys.iter_mut().chain(&mut pose.arcs) {
-            memory.resize(joints, [0.0; 4]);
-        }
+        pose.resize(joints);
         for (instance, &(clip, tick)) in self.at.iter().enumerate() {
             let at = instance * joints..(instance + 1) * joints;
             let is_posed = values_of_pose > PoseValues::Rotations || !states.rotations.is_empty();
@@ -669,16 +675,16 @@ impl InLanes for StatesTask<'_, '_> {
 
 /// The poses of a library's clips.
 #[derive(Clone, Copy)]
-struct Poses<'a> {
-    tables: &'a MotionTables,
-    spans: &'a [CrowdSpan],
-    cells: &'a [[f32; 4]],
+pub(super) struct Poses<'a> {
+    pub(super) tables: &'a MotionTables,
+    pub(super) spans: &'a [CrowdSpan],
+    pub(super) cells: &'a [[f32; 4]],
 }
 
 impl Poses<'_> {
     /// Computes the pose of a clip at a tick: rotations in the parents' frames to `local`, the rest to `world`.
     #[inline(always)]
-    fn compute<L: Lanes>(
+    pub(super) fn compute<L: Lanes>(
         &self,
         (clip, tick): (u32, u32),
         values_of_pose: PoseValues,
@@ -786,7 +792,7 @@ impl Joint {
 
     /// Sets the velocities to the difference of two states, divided by the time between them, `1 / per_second`.
     #[inline(always)]
-    fn differ(&mut self, before: &Self, after: &Self, per_second: f32) {
+    pub(super) fn differ(&mut self, before: &Self, after: &Self, per_second: f32) {
         let [x, y, z] = before.position.map(|coordinate| -coordinate);
         self.velocity = scaled(sum(after.position, [x, y, z]), per_second).map(canonical);
         let [x, y, z, w] = before.rotation;

@@ -139,7 +139,9 @@ pub(crate) fn trials(kernel: Kernel, random: &mut Random) -> Vec<Trial> {
         Kernel::MotionJoints
         | Kernel::MotionWalk
         | Kernel::MotionDifferences
-        | Kernel::MotionStore => motion::trials(kernel, random),
+        | Kernel::MotionStore
+        | Kernel::MotionTree
+        | Kernel::MotionPick => motion::trials(kernel, random),
         _ => segments::trials(kernel, random),
     }
 }
