@@ -79,6 +79,8 @@ mod _tumble {
     #[pymodule_export]
     use crate::function::evaluate;
     #[pymodule_export]
+    use crate::motions::robots::{robot_motions, sample_bodies};
+    #[pymodule_export]
     use crate::motions::scalars::scalar_motions;
     #[pymodule_export]
     use crate::motions::{Motions, put_w_first, represent};

@@ -1,5 +1,6 @@
 //! The tables behind `tumble.MotionLibrary`: clips of one skeleton, sampled at many times at once.
 
+pub(crate) mod robots;
 pub(crate) mod scalars;
 
 use std::borrow::Cow;
@@ -14,9 +15,10 @@ use numpy::{
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use tumble::crowd::{
-    CrowdError, FrameStep, KeyPrecision, MotionBuilder, MotionClip, MotionStates, MotionTables,
-    MotionWords,
+    BodyTables, CrowdError, FrameStep, KeyPrecision, MotionBuilder, MotionClip, MotionStates,
+    MotionTables, MotionWords,
 };
+use tumble::trees::{FrameWords, TreeFrames};
 use tumble::{Channel, Device, Error, MatrixOrder, Method, Skeleton, VectorMethod};
 use tumble_formats::motion::Motion;
 use tumble_formats::sample::{ChannelMethods, MethodChoice};
@@ -51,7 +53,7 @@ pub(crate) const MANY: usize = 1 << 21;
 /// The clips of a motion library, prepared: what is sampled, and its arrays for files.
 #[pyclass(frozen, weakref, module = "tumble._tumble")]
 pub(crate) struct Motions {
-    tables: MotionTables,
+    pub(crate) tables: Tables,
     spans: Py<PyArray2<u32>>,
     cells: Py<PyArray2<f32>>,
     /// For each clip, the reason why it has no positions; empty if it has. No entries if all clips have positions.
@@ -60,6 +62,9 @@ pub(crate) struct Motions {
     /// The names of the joints; no entries in files that do not store them.
     #[pyo3(get)]
     joint_names: Vec<String>,
+    /// The names of a robot's bodies; no entries for a skeleton.
+    #[pyo3(get)]
+    body_names: Vec<String>,
     /// The clips that were left out because they do not fit: their indices in the list, and the reasons.
     #[pyo3(get)]
     skipped: Vec<SkippedClip>,
@@ -67,6 +72,23 @@ pub(crate) struct Motions {
 
 /// The index of a clip in a list, and the reason why it was left out.
 type SkippedClip = (usize, String);
+
+/// The tables of a library.
+pub(crate) enum Tables {
+    /// Joints of a skeleton.
+    Skeleton(MotionTables),
+    /// Joints and bodies of a robot.
+    Robot(BodyTables),
+}
+
+impl Tables {
+    fn motions(&self) -> &MotionTables {
+        match self {
+            Self::Skeleton(tables) => tables,
+            Self::Robot(tables) => tables.tables(),
+        }
+    }
+}
 
 /// The skeleton that the caller chose for all clips of a library or a crowd.
 pub(crate) enum ChosenSkeleton {
@@ -310,11 +332,33 @@ fn fitting(
         !skipped.iter().any(|(skipped, _)| Some(*skipped) == index)
     });
     match kept.is_empty() {
-        true => Err(input(format!(
-            "no clip fits the library; the first: {}",
-            skipped.first().map_or("", |(_, reason)| reason)
-        ))),
+        true => Err(none_fits(&skipped)),
         false => Ok((kept, skipped)),
+    }
+}
+
+/// The exception for a library all of whose clips were left out.
+fn none_fits(skipped: &[SkippedClip]) -> PyErr {
+    input(format!(
+        "no clip fits the library; the first: {}",
+        skipped.first().map_or("", |(_, reason)| reason)
+    ))
+}
+
+/// The ticks in a second for clips.
+fn ticks_for<'a>(clips: impl IntoIterator<Item = &'a Motion>) -> u32 {
+    let longest = clips.into_iter().map(length).fold(1e-3, f64::max);
+    let whole = (LONGEST / longest / f64::from(TICKS)).floor().min(FINEST);
+    match whole >= 1.0 {
+        true => whole as u32 * TICKS,
+        false => (LONGEST / longest).max(1.0) as u32,
+    }
+}
+
+fn precision_of(packed: bool) -> KeyPrecision {
+    match packed {
+        true => KeyPrecision::Packed,
+        false => KeyPrecision::Exact,
     }
 }
 
@@ -330,20 +374,22 @@ pub(crate) fn of_pushed(error: CrowdError, listed: ListedClip<'_>) -> PyErr {
 type BuiltTables = (MotionTables, Vec<[u32; 4]>, Vec<[f32; 4]>);
 
 /// The tables of clips, each of which is made by `clip`.
-fn built<'a>(
+fn built<'a, 'c>(
     skeleton: &Skeleton,
     (ticks_per_second, precision): (u32, KeyPrecision),
-    clips: &'a [Clip],
-    clip: impl Fn(ListedClip<'a>) -> PyResult<MotionClip<'a>>,
+    clips: &[ListedClip<'c>],
+    clip: impl Fn(usize, ListedClip<'c>) -> PyResult<MotionClip<'a>>,
 ) -> PyResult<BuiltTables> {
     let made = MotionBuilder::new(skeleton, ticks_per_second, precision);
     let mut builder = made.map_err(of_crowd)?;
     let engine = tumble::Engine::new(Device::Cpu).map_err(|it| of_engine(&it))?;
-    let mut listed = ListedClip::all(clips).peekable();
-    while listed.peek().is_some() {
-        let batch: Vec<ListedClip<'_>> = listed.by_ref().take(CLIPS_AT_ONCE).collect();
-        let made: PyResult<Vec<MotionClip<'_>>> = batch.iter().map(|&it| clip(it)).collect();
-        let pushed = builder.push_all(&engine, &made?);
+    for (first, batch) in (0..)
+        .step_by(CLIPS_AT_ONCE)
+        .zip(clips.chunks(CLIPS_AT_ONCE))
+    {
+        let made = batch.iter().enumerate();
+        let made = made.map(|(index, &listed)| clip(first + index, listed));
+        let pushed = builder.push_all(&engine, &made.collect::<PyResult<Vec<_>>>()?);
         pushed.map_err(|(index, error)| of_pushed(error, batch[index]))?;
     }
     Ok(builder.finish())
@@ -363,10 +409,6 @@ impl Motions {
         skip: bool,
         packed: bool,
     ) -> PyResult<Self> {
-        let precision = match packed {
-            true => KeyPrecision::Packed,
-            false => KeyPrecision::Exact,
-        };
         let method = method_named(method)?;
         let tracks = |clips: &[Clip]| {
             clips
@@ -402,18 +444,16 @@ impl Motions {
         let prepared = py.detach(|| {
             stoppable(|| {
                 let skeleton = shared.of_engine()?;
-                let longest = clips.iter().map(|clip| length(&clip.motion));
-                let longest = longest.fold(1e-3, f64::max);
-                let whole = (LONGEST / longest / f64::from(TICKS)).floor().min(FINEST);
-                let ticks = match whole >= 1.0 {
-                    true => whole as u32 * TICKS,
-                    false => (LONGEST / longest).max(1.0) as u32,
-                };
-                built(&skeleton, (ticks, precision), &clips, |listed| {
+                let ticks = ticks_for(clips.iter().map(|clip| &*clip.motion));
+                let listed: Vec<_> = ListedClip::all(&clips).collect();
+                let options = (ticks, precision_of(packed));
+                built(&skeleton, options, &listed, |_, listed| {
                     motion_clip(&shared, listed, method)
                 })
             })
         })?;
+        let (tables, spans, cells) = prepared;
+        let prepared = (Tables::Skeleton(tables), spans, cells);
         Ok(Self {
             unplaced,
             skipped,
@@ -455,7 +495,23 @@ impl Motions {
                 return Err(of_crowd(CrowdError::BrokenTables));
             }
             let tables = || MotionTables::new(words, (parts.0.0, parts.1.0)).map_err(of_crowd);
-            spans.py().detach(|| stoppable(tables))?
+            let tables = spans.py().detach(|| stoppable(tables))?;
+            match arrays.contains(TREE_FRAMES)? {
+                false => Tables::Skeleton(tables),
+                true => {
+                    let bodies = words::<2>(arrays, TREE_BODIES)?;
+                    let [[w_first], scalars @ ..] = &words::<1>(arrays, TREE_SCALARS)?[..] else {
+                        return Err(of_crowd(CrowdError::BrokenTables));
+                    };
+                    let frames = TreeFrames::of_words(&FrameWords {
+                        frames: words(arrays, TREE_FRAMES)?,
+                        bodies,
+                        scalars: scalars.as_flattened().to_vec(),
+                        is_w_first: *w_first != 0,
+                    });
+                    Tables::Robot(BodyTables::new(tables, frames).map_err(of_crowd)?)
+                }
+            }
         };
         let texts = |name: &str| match arrays.get_item(name)? {
             Some(array) => array.call_method0("tolist")?.extract::<Vec<String>>(),
@@ -467,6 +523,7 @@ impl Motions {
             cells: cells.unbind(),
             unplaced: texts("unplaced")?,
             joint_names: texts("joint_names")?,
+            body_names: texts("body_names")?,
             skipped: Vec::new(),
         })
     }
@@ -478,32 +535,46 @@ impl Motions {
         py: Python<'py>,
         clips: Option<ListArgument<usize>>,
     ) -> PyResult<Bound<'py, PyDict>> {
-        let Some(ListArgument(clips)) = clips else {
-            let parts = [self.spans.bind(py).as_any(), self.cells.bind(py).as_any()];
-            return arrays_of(py, self.tables.words(), parts);
+        let found = match clips {
+            None => {
+                let parts = [self.spans.bind(py).as_any(), self.cells.bind(py).as_any()];
+                arrays_of(py, self.tables.motions().words(), parts)?
+            }
+            Some(ListArgument(clips)) => {
+                let (tables, spans, cells) = self.with_parts(py, |tables, parts| {
+                    guarded(|| tables.select(parts, &clips).map_err(of_crowd))
+                })?;
+                let (spans, cells) = (spans_array(py, spans)?, cells_array(py, cells)?);
+                arrays_of(py, tables.words(), [spans.as_any(), cells.as_any()])?
+            }
         };
-        let (tables, spans, cells) = self.with_parts(py, |tables, parts| {
-            guarded(|| tables.select(parts, &clips).map_err(of_crowd))
-        })?;
-        let (spans, cells) = (spans_array(py, spans)?, cells_array(py, cells)?);
-        arrays_of(py, tables.words(), [spans.as_any(), cells.as_any()])
+        if let Tables::Robot(tables) = &self.tables {
+            let words = tables.frames().words();
+            put(&found, TREE_FRAMES, words.frames)?;
+            put(&found, TREE_BODIES, words.bodies)?;
+            let scalars = [u32::from(words.is_w_first)]
+                .into_iter()
+                .chain(words.scalars);
+            put(&found, TREE_SCALARS, scalars.map(|word| [word]).collect())?;
+        }
+        Ok(found)
     }
 
     /// Number of clips.
     fn __len__(&self) -> usize {
-        self.tables.clip_count()
+        self.tables.motions().clip_count()
     }
 
     /// Number of ticks in a second.
     #[getter]
     fn ticks_per_second(&self) -> u32 {
-        self.tables.ticks_per_second()
+        self.tables.motions().ticks_per_second()
     }
 
     /// Number of joints.
     #[getter]
     pub(crate) fn joints(&self) -> usize {
-        self.tables.joint_count()
+        self.tables.motions().joint_count()
     }
 
     /// Fills arrays: rotations, positions, world rotations, velocities and angular velocities, each None
@@ -559,7 +630,8 @@ impl Motions {
         let [r, p, w, v, a] = &mut outputs[..] else {
             return Ok(());
         };
-        let joints = at.len() * self.tables.joint_count();
+        let motions = self.tables.motions();
+        let joints = at.len() * motions.joint_count();
         let states = MotionStates {
             rotations: rows(r, joints)?,
             positions: rows(p, joints)?,
@@ -570,8 +642,8 @@ impl Motions {
         let engine = engine.get().engine_for(1)?;
         let work = || {
             let sampled = match &steps {
-                Some(steps) => (self.tables).differences_into(&engine, tables, &at, steps, states),
-                None => self.tables.sample_into(&engine, tables, &at, states),
+                Some(steps) => motions.differences_into(&engine, tables, &at, steps, states),
+                None => motions.sample_into(&engine, tables, &at, states),
             };
             sampled.map_err(of_crowd)
         };
@@ -586,7 +658,7 @@ impl Motions {
     /// The library of tables, all of whose clips have positions.
     fn of_parts(
         py: Python<'_>,
-        (tables, spans, cells): BuiltTables,
+        (tables, spans, cells): (Tables, Vec<[u32; 4]>, Vec<[f32; 4]>),
         joint_names: Vec<String>,
     ) -> PyResult<Self> {
         Ok(Self {
@@ -595,6 +667,7 @@ impl Motions {
             cells: cells_array(py, cells)?.unbind(),
             unplaced: Vec::new(),
             joint_names,
+            body_names: Vec::new(),
             skipped: Vec::new(),
         })
     }
@@ -609,7 +682,7 @@ impl Motions {
         let cells = self.cells.bind(py).try_readonly()?;
         let spans = spans.as_slice()?.as_chunks().0;
         let cells = cells.as_slice()?.as_chunks().0;
-        py.detach(|| work(&self.tables, (spans, cells)))
+        py.detach(|| work(self.tables.motions(), (spans, cells)))
     }
 
     /// Fails if positions are requested of a clip whose joints have none.
@@ -630,7 +703,7 @@ impl Motions {
         times: &PyReadonlyArray1<'_, f64>,
         (rates, lengths): (&[f64], &[f64]),
     ) -> PyResult<Vec<FrameStep>> {
-        let per_second = f64::from(self.tables.ticks_per_second());
+        let per_second = f64::from(self.tables.motions().ticks_per_second());
         let step = |(&(clip, _), &time): (&(u32, u32), &f64)| {
             let (rate, length) = (rates[clip as usize], lengths[clip as usize]);
             // A time within a millionth of a frame counts as at the frame.
@@ -641,7 +714,7 @@ impl Motions {
                 per_second: rate as f32,
             }
         };
-        match rates.len() == self.tables.clip_count() && lengths.len() == rates.len() {
+        match rates.len() == self.tables.motions().clip_count() && lengths.len() == rates.len() {
             true => Ok(at.iter().zip(times.as_array()).map(step).collect()),
             false => Err(input("frames: give a rate and a length for each clip")),
         }
@@ -661,12 +734,13 @@ impl Motions {
                 ids.len()
             )));
         }
-        let per_second = f64::from(self.tables.ticks_per_second());
+        let per_second = f64::from(self.tables.motions().ticks_per_second());
         let one = |(index, (&clip, &time)): (usize, (&i64, &f64))| {
             let ticks = u32::try_from(clip).ok();
-            let ticks = ticks.and_then(|clip| Some((clip, self.tables.ticks(clip as usize)?)));
+            let ticks =
+                ticks.and_then(|clip| Some((clip, self.tables.motions().ticks(clip as usize)?)));
             let Some((clip, ticks)) = ticks else {
-                let count = self.tables.clip_count();
+                let count = self.tables.motions().clip_count();
                 return Err(input(format!(
                     "clip_ids[{index}]: there is no clip {clip}; there are {count}, from 0"
                 )));
@@ -746,21 +820,27 @@ fn cells_array(py: Python<'_>, cells: Vec<[f32; 4]>) -> PyResult<Bound<'_, PyArr
     PyArray1::from_vec(py, cells.into_flattened()).reshape([count, 4])
 }
 
+/// Arrays in which a file has the tree of a robot: its frames, its bodies, and its scalars behind whether w is first.
+const TREE_FRAMES: &str = "tree_frames";
+const TREE_BODIES: &str = "tree_bodies";
+const TREE_SCALARS: &str = "tree_scalars";
+
+fn put<const N: usize>(
+    found: &Bound<'_, PyDict>,
+    name: &str,
+    words: Vec<[u32; N]>,
+) -> PyResult<()> {
+    let count = words.len();
+    let flat = PyArray1::from_vec(found.py(), words.into_flattened());
+    found.set_item(name, flat.reshape([count, N])?)
+}
+
 /// Small tables, and the spans and cells that belong to them, as arrays by their names.
 fn arrays_of<'py>(
     py: Python<'py>,
     words: MotionWords,
     [spans, cells]: [&Bound<'py, PyAny>; 2],
 ) -> PyResult<Bound<'py, PyDict>> {
-    fn put<const N: usize>(
-        found: &Bound<'_, PyDict>,
-        name: &str,
-        words: Vec<[u32; N]>,
-    ) -> PyResult<()> {
-        let count = words.len();
-        let flat = PyArray1::from_vec(found.py(), words.into_flattened());
-        found.set_item(name, flat.reshape([count, N])?)
-    }
     let found = PyDict::new(py);
     put(&found, "clips", words.clips)?;
     put(&found, "bases", words.bases)?;

@@ -43,7 +43,7 @@ use crate::threads::stop;
 /// clip.push("joints", &[0.0, 2.0], &[Quat::IDENTITY; 2])?;
 /// clip.set_translations(0, &[0.0, 2.0], &[Vec3::ZERO, Vec3::X], &[])?;
 /// let tracks = JointTracks { scalars: vec![[0, 0]], ..JointTracks::default() };
-/// let frames = tree.frames(&tracks, &tree.order(BodyOrder::DepthFirst, Siblings::File), &[], false)?;
+/// let frames = tree.frames(&tracks, &tree.order(BodyOrder::DepthFirst, Siblings::File), &[])?;
 ///
 /// let skeleton = Skeleton::new(vec![None], vec![Vec3::ZERO])?;
 /// let mut builder = MotionBuilder::new(&skeleton, 705_600, KeyPrecision::Exact)?;

@@ -81,8 +81,7 @@ impl DeviceBodies {
         arrays: &[BodyArray],
     ) -> Result<(MappedStates, Vec<Range<usize>>), CrowdError> {
         let work = |request: &StatesRequest<'_>| self.resident.evaluate(request);
-        let (states, ranges) =
-            with_request(self.clips, (at, steps), &self.stored(arrays), work)?;
+        let (states, ranges) = with_request(self.clips, (at, steps), &self.stored(arrays), work)?;
         Ok((states, ranges.into_iter().map(in_memory).collect()))
     }
 
@@ -98,8 +97,7 @@ impl DeviceBodies {
         arrays: &[BodyArray],
     ) -> Result<(ExportedResult, Vec<Range<usize>>), CrowdError> {
         let work = |request: &StatesRequest<'_>| self.resident.export(request);
-        let (states, ranges) =
-            with_request(self.clips, (at, steps), &self.stored(arrays), work)?;
+        let (states, ranges) = with_request(self.clips, (at, steps), &self.stored(arrays), work)?;
         Ok((states, ranges.into_iter().map(in_memory).collect()))
     }
 

@@ -197,7 +197,9 @@ fn tree(random: &mut Random, moves: u32) -> Trial {
         FRAME_HINGE,
     ];
     let above = [NO_FRAME, 0, 1, 2, NO_FRAME, 4, 5, 6, 7, 3];
-    let root_of = [0, 0, 0, 0, NO_FRAME, NO_FRAME, NO_FRAME, NO_FRAME, NO_FRAME, 0];
+    let root_of = [
+        0, 0, 0, 0, NO_FRAME, NO_FRAME, NO_FRAME, NO_FRAME, NO_FRAME, 0,
+    ];
     let frame = |random: &mut Random, index: usize| {
         let track = random.below(JOINTS) * WORDS;
         let is_scalar = matches!(kinds[index], FRAME_HINGE | FRAME_SLIDE);

@@ -58,6 +58,13 @@ pub struct FrameWords {
 }
 
 impl TreeFrames {
+    /// The same with quaternions in the order `w x y z`.
+    #[must_use]
+    pub fn with_w_first(mut self) -> Self {
+        self.is_w_first = true;
+        self
+    }
+
     /// Number of bodies.
     #[must_use]
     pub fn body_count(&self) -> usize {
@@ -175,7 +182,7 @@ fn rounded(value: f64) -> f32 {
 impl Tree {
     /// Frames of these bodies (indices of [`Tree::bodies`]), whose joints `tracks` move. Velocities are those at the
     /// bodies' origins, or at `points`, one in the frame of each body of the tree, such as its centre of mass. Quaternions
-    /// are `w x y z` or `x y z w`.
+    /// are `x y z w`, or `w x y z` of [`TreeFrames::with_w_first`].
     ///
     /// # Errors
     /// When there is not a track for each joint or a point for each body, a body does not exist, or a constant is too
@@ -185,7 +192,6 @@ impl Tree {
         tracks: &JointTracks,
         bodies: &[usize],
         points: &[DVec3],
-        is_w_first: bool,
     ) -> Result<TreeFrames, TreeError> {
         let counts = self.counts();
         let count = |kind, found, expected| match found == expected {
@@ -238,8 +244,7 @@ impl Tree {
                         (frame.kind, frame.source) = (FRAME_FREE, first_word(tracks.free[index]));
                     }
                     JointValue::Ball(index) => {
-                        (frame.kind, frame.source) =
-                            (FRAME_BALL, first_word(tracks.balls[index]));
+                        (frame.kind, frame.source) = (FRAME_BALL, first_word(tracks.balls[index]));
                     }
                     JointValue::Scalar {
                         index,
@@ -279,7 +284,7 @@ impl Tree {
             bodies: at(&of_bodies),
             frames: frames.0,
             scalars: tracks.scalars.iter().map(|&scalar| word(scalar)).collect(),
-            is_w_first,
+            is_w_first: false,
         })
     }
 
@@ -292,9 +297,8 @@ impl Tree {
                 value,
             })
         };
-        let is_large = |vector: DVec3| {
-            !vector.is_finite() || vector.abs().max_element() > LARGEST_CONSTANT
-        };
+        let is_large =
+            |vector: DVec3| !vector.is_finite() || vector.abs().max_element() > LARGEST_CONSTANT;
         for (index, body) in self.bodies.iter().enumerate() {
             let point = points.get(index).copied().unwrap_or_default();
             if let Some(vector) = [body.position, point].into_iter().find(|&it| is_large(it)) {

@@ -264,6 +264,20 @@ impl Tree {
         })
     }
 
+    /// All hinges and slides, each with the index in [`Configuration::scalars`] of the value that moves it, and the factor
+    /// and the offset with which it does: 1 and 0 but for joints that mimic others.
+    pub fn scalar_values(&self) -> impl Iterator<Item = (&TreeJoint, usize, [f64; 2])> {
+        let pairs = self.joints().zip(&self.values);
+        pairs.filter_map(|(joint, value)| match *value {
+            JointValue::Scalar {
+                index,
+                multiplier,
+                offset,
+            } => Some((joint, index, [multiplier, offset])),
+            JointValue::Ball(_) | JointValue::Free(_) => None,
+        })
+    }
+
     /// How many values a configuration has.
     #[must_use]
     pub fn counts(&self) -> JointCounts {
