@@ -500,7 +500,8 @@ impl Motions {
                 false => Tables::Skeleton(tables),
                 true => {
                     let bodies = words::<2>(arrays, TREE_BODIES)?;
-                    let [[w_first], scalars @ ..] = &words::<1>(arrays, TREE_SCALARS)?[..] else {
+                    let scalars = words::<1>(arrays, TREE_SCALARS)?;
+                    let [[w_first], scalars @ ..] = &scalars[..] else {
                         return Err(of_crowd(CrowdError::BrokenTables));
                     };
                     let frames = TreeFrames::of_words(&FrameWords {

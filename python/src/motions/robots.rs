@@ -2,12 +2,12 @@
 
 use std::borrow::Cow;
 
-use numpy::{PyArrayDyn, PyArrayMethods, PyReadonlyArray1};
+use numpy::{BorrowError, PyArrayDyn, PyArrayMethods, PyReadonlyArray1, PyReadwriteArrayDyn};
 use pyo3::prelude::*;
-use tumble::Method;
-use tumble::VectorMethod;
 use tumble::crowd::{BodyStates, BodyTables, MotionClip};
-use tumble::trees::Tree;
+use tumble::trees::{Tree, TreeError};
+use tumble::{Channel, Method, VectorMethod};
+use tumble_formats::Diagnostic;
 use tumble_formats::motion::Motion;
 use tumble_formats::robot::{self, RobotTracks, VelocityPoint};
 use tumble_formats::sample::{ChannelMethods, MethodChoice};
@@ -18,7 +18,7 @@ use crate::engine::Engine;
 use crate::errors::{guarded, input, of_diagnostic, warn};
 use crate::motions::scalars::vector_method;
 use crate::motions::{
-    ListedClip, MANY, Motions, SkippedClip, Tables, built, none_fits, of_crowd, precision_of,
+    ListedClip, MANY, Motions, SkippedClip, Tables, built, none_fits, of_crowd, precision_of, rows,
     ticks_for,
 };
 use crate::names::option_named;
@@ -73,7 +73,7 @@ pub(crate) fn robot_motions(
         return Err(none_fits(&skipped));
     }
     warn(py, &warnings)?;
-    let of_tree = |error: tumble::trees::TreeError| input(format!("robot: {error}"));
+    let of_tree = |error: TreeError| input(format!("robot: {error}"));
     let (parts, frames) = py.detach(|| {
         stoppable(|| {
             let tracks = RobotTracks::new(tree, &motions);
@@ -118,7 +118,7 @@ fn assigned(
     robot: &Robot,
     listed: ListedClip<'_>,
     method: MethodChoice,
-) -> PyResult<(Motion, Vec<tumble_formats::Diagnostic>)> {
+) -> PyResult<(Motion, Vec<Diagnostic>)> {
     let name = listed.to_string();
     let clip = listed.clip;
     let (motion, warnings) = py.detach(|| {
@@ -149,10 +149,8 @@ fn methods(tree: &Tree, motion: &Motion, method: MethodChoice) -> Option<(Method
         .map(|joint| joint.name.clone())
         .collect();
     let of_scalars = vector_method(motion, &names, method);
-    let moves = |track| {
-        let channel = tumble::Channel::Translation;
-        motion.set.vector_keys(channel, track).is_some()
-    };
+    let keys = |track| motion.set.vector_keys(Channel::Translation, track);
+    let moves = |track| keys(track).is_some();
     if method.0.is_none() && (0..motion.set.track_count()).any(moves) {
         let of_positions = choice.vector_method_of(motion)?;
         let has_scalars = motion.set.scalar_count() > 0;
@@ -195,15 +193,6 @@ pub(crate) fn sample_bodies(
             .map(PyArrayMethods::try_readwrite)
             .transpose()
     });
-    fn memory<'a, const N: usize>(
-        of: &'a mut Result<Option<numpy::PyReadwriteArrayDyn<'_, f32>>, numpy::BorrowError>,
-        rows: usize,
-    ) -> PyResult<&'a mut [[f32; N]]> {
-        match of {
-            Ok(of) => crate::motions::rows(of, rows),
-            Err(error) => Err(input(format!("out: {error}"))),
-        }
-    }
     let [p, v, x, q, l, a] = &mut outputs;
     let states = BodyStates {
         joint_values: memory::<1>(p, scalars)?.as_flattened_mut(),
@@ -224,4 +213,15 @@ pub(crate) fn sample_bodies(
             false => stoppable(work),
         }
     })
+}
+
+/// The memory of an output, if it could be borrowed.
+fn memory<'a, const N: usize>(
+    of: &'a mut Result<Option<PyReadwriteArrayDyn<'_, f32>>, BorrowError>,
+    count: usize,
+) -> PyResult<&'a mut [[f32; N]]> {
+    match of {
+        Ok(of) => rows(of, count),
+        Err(error) => Err(input(format!("out: {error}"))),
+    }
 }
