@@ -150,7 +150,8 @@ fn clip_around(tree: &Tree, at: &Configuration, rates: &ConfigurationRates) -> M
     };
     let moved = |set: &mut TrackSet, name: &str, pose: BodyPose, rate: BodyVelocity| {
         let keys = turned(pose.rotation.normalize(), rate.angular);
-        let track = set.push(name, &times, &keys).unwrap();
+        let track = set.track_count();
+        set.push(name, &times, &keys).unwrap();
         let points = ends(rate.linear).map(|step| (pose.position + step).as_vec3());
         set.set_translations(track, &times, &points, &[]).unwrap();
     };

@@ -478,7 +478,7 @@ impl Motions {
         let [sizes, ..] = words::<2>(arrays, "sizes")?[..] else {
             return Err(of_crowd(CrowdError::BrokenTables));
         };
-        let words = MotionWords {
+        let of_tables = MotionWords {
             clips: words(arrays, "clips")?,
             bases: words(arrays, "bases")?,
             channels: words(arrays, "channels")?,
@@ -494,7 +494,7 @@ impl Motions {
             if !(parts.0.1.is_empty() && parts.1.1.is_empty()) {
                 return Err(of_crowd(CrowdError::BrokenTables));
             }
-            let tables = || MotionTables::new(words, (parts.0.0, parts.1.0)).map_err(of_crowd);
+            let tables = || MotionTables::new(of_tables, (parts.0.0, parts.1.0)).map_err(of_crowd);
             let tables = spans.py().detach(|| stoppable(tables))?;
             match arrays.contains(TREE_FRAMES)? {
                 false => Tables::Skeleton(tables),

@@ -85,7 +85,8 @@ impl ScalarTracks {
         let (ends, still) = ([first, last], [Quat::IDENTITY; 2]);
         let count = if first < last { 2 } else { 1 };
         for pair in self.starts.windows(2) {
-            let track = set.push("", &ends[..count], &still[..count])?;
+            let track = set.track_count();
+            set.push("", &ends[..count], &still[..count])?;
             let scalars: Vec<Option<(usize, ScalarKeys<'_>)>> = self.names[pair[0]..pair[1]]
                 .iter()
                 .map(|name| scalar_of(clip, name))

@@ -109,14 +109,14 @@ impl<'a> RobotTracks<'a> {
         let mut set = TrackSet::new();
         let start = clip.set.time_span().map_or(0.0, |(first, _)| first);
         for (name, rest) in &self.moving {
-            let position = rest.position.as_vec3();
+            let (index, position) = (set.track_count(), rest.position.as_vec3());
             let Some(track) = track_of(&clip.set, name) else {
-                let index = set.push("", &[start], &[rest.rotation.as_quat()])?;
+                set.push("", &[start], &[rest.rotation.as_quat()])?;
                 set.set_translations(index, &[start], &[position], &[])?;
                 continue;
             };
             let keys = clip.set.track(track);
-            let index = set.push("", keys.times, keys.keys)?;
+            set.push("", keys.times, keys.keys)?;
             carry_key_data(&mut set, index, &keys, 0..keys.keys.len())?;
             let Some(at) = clip.set.vector_keys(Channel::Translation, track) else {
                 set.set_translations(index, &keys.times[..1], &[position], &[])?;

@@ -574,6 +574,13 @@ class MotionLibrary(Generic[_A]):
         if skeleton is not None and not isinstance(skeleton, tuple):
             skeleton = shaped(_clip_of(skeleton), tracks=tracks, collapse=collapse, method=method)
         every = before + clips
+        of_robot: dict[str, Any] = {
+            "robot": robot,
+            "order": order,
+            "body_order": body_order,
+            "siblings": siblings,
+            "velocity_at": velocity_at,
+        }
         made: MotionLibrary[Any] = cls(
             [clip for _, clip in every],
             method=method,
@@ -581,12 +588,8 @@ class MotionLibrary(Generic[_A]):
             engine=engine,
             on_error=on_error,
             packed=packed,
-            robot=robot,
-            order=order,
-            body_order=body_order,
-            siblings=siblings,
-            velocity_at=velocity_at,
             device=device,
+            **of_robot,
         )
         file_of = np.array([index for index, _ in every], np.int64)
         del before, clips, every
@@ -830,17 +833,17 @@ class MotionLibrary(Generic[_A]):
             raise TypeError(f'arrays: {arrays!r} is one name; give a list, such as ["{arrays}"]')
         for name in arrays if arrays is not None else ():
             self._check_name(name)
+        every: tuple[str, ...] = _BODIES if self._bodies else _NAMES
         if self._device is not None:
             if out is not None or order not in (None, "xyzw") or rotations != "quaternion":
                 raise InputError(
                     "out, order and rotations: a library on a device makes new arrays of quaternions x y z w; leave them out,"
                     " and convert on the device, or use a library without `device`"
                 )
-            every = _BODIES if self._bodies else _NAMES
             return self._sampled_on_device(ids, moments, shape, every if arrays is None else tuple(arrays), finite)
         if out is None:
-            every = (*_NAMES, *(name for name in _SCALARS if self._scalars[_kind(name)].names))
-            every = _BODIES if self._bodies else every
+            if not self._bodies:
+                every = (*every, *(name for name in _SCALARS if self._scalars[_kind(name)].names))
             asked = every if arrays is None else arrays
             out = MotionState(**{name: _aligned((*shape, *each[name])) for name in asked})
         elif not isinstance(out, MotionState):
@@ -848,7 +851,7 @@ class MotionLibrary(Generic[_A]):
         elif arrays is not None:
             raise InputError("arrays and out: the arrays of `out` are those that are filled; give one of the two")
         else:
-            for name in (*_SCALARS, *_BODIES):
+            for name in _ALL:
                 if getattr(out, name) is not None:
                     self._check_name(name)
             _check_out(out, shape, each)
@@ -1415,8 +1418,6 @@ def _check_out(out: MotionState, shape: tuple[int, ...], each: dict[str, tuple[i
         array = getattr(out, name)
         if array is None:
             continue
-        if name not in each:
-            raise InputError(f"out: it has {name}; the library has a robot, whose arrays are {', '.join(each)}")
         expected = (*shape, *each[name])
         if not isinstance(array, np.ndarray):
             raise InputError(f"out: its {name} are of the type {type(array).__name__}; give an array of NumPy")
