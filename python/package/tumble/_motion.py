@@ -793,9 +793,10 @@ class MotionLibrary(Generic[_A]):
 
         `arrays`: the names of those to compute, by default all; fewer arrays take less time. `out`: a state; the arrays
         that it has are filled again. `finite`: velocities as differences of the two frames of the clip's rate around a
-        time, as other motion libraries have them, instead of the exact derivatives. `order`: of quaternions, by default "xyzw"; that
-        of a library with `robot` was stated when it was made. `rotations`: how both arrays of rotations are stored: "quaternion" (…, 4), "matrix" (…, 3, 3) for column vectors, "6d" (…, 6),
-        the first two columns of the matrix (`six-columns` of docs/features.md), or "rotvec" (…, 3), axis times angle.
+        time, as other motion libraries have them, instead of the exact derivatives. `order`: of quaternions, by
+        default "xyzw"; that of a library with `robot` was stated when it was made. `rotations`: how both arrays of
+        rotations are stored: "quaternion" (…, 4), "matrix" (…, 3, 3) for column vectors, "6d" (…, 6), the first two
+        columns of the matrix (`six-columns` of docs/features.md), or "rotvec" (…, 3), axis times angle.
 
         A library on a device returns new `DeviceArray`s: `out`, `order` and `rotations` are for the CPU alone. `clip_ids`
         and `times` are read by the host; arrays of a device are copied to it first.
