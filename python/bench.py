@@ -11,6 +11,7 @@ import gc
 import os
 import pathlib
 import subprocess
+import tempfile
 import time
 from collections.abc import Callable
 from typing import Any
@@ -150,6 +151,36 @@ def motions(rng: np.random.Generator) -> None:
     print(f"  a loop over the instances   {1e3 * one_by_one:9.2f} ms")
     print(f"  rotations                   {1e3 * ours:9.2f} ms   {ours / theirs:.2f} x as long")
     print(f"  all five arrays             {1e3 * all_five:9.2f} ms   {all_five / theirs:.2f} x as long")
+    bodies = 30
+    robot = robots(rng, bodies, frames)
+    state = robot.sample(ids, times)
+    of_robot = shortest(lambda: robot.sample(ids, times, out=state), 30)
+    each, of_joints = (1e9 * seconds / pairs for seconds in (of_robot / bodies, all_five / joints))
+    print(f"  a robot of {bodies} bodies, all    {1e3 * of_robot:9.2f} ms   {each:.0f} ns a body; {of_joints:.0f} ns a joint above")
+
+
+def robots(rng: np.random.Generator, bodies: int, frames: Any) -> tumble.MotionLibrary:
+    """As many clips of a robot whose bodies have a hinge each, but the root."""
+    axes = ["1 0 0", "0 1 0", "0 0 1"]
+    open_bodies, text = 1, '<body name="b0"><freejoint name="root"/>'
+    for body in range(1, bodies):
+        # Chains of six bodies, from the root on.
+        if open_bodies == 7:
+            text, open_bodies = text + "</body>" * 6, 1
+        text += f'<body name="b{body}" pos="0 0 0.1"><joint name="j{body}" axis="{axes[body % 3]}"/>'
+        open_bodies += 1
+    file = pathlib.Path(tempfile.mkdtemp(), "robot.xml")
+    file.write_text(f"<mujoco><worldbody>{text}{'</body>' * open_bodies}</worldbody></mujoco>")
+    made = []
+    for count in frames:
+        angles = np.cumsum(0.02 * rng.normal(size=(bodies - 1, count)), axis=1)
+        half = np.cumsum(0.01 * rng.normal(size=count))
+        keys = np.stack([0 * half, 0 * half, np.sin(half), np.cos(half)], axis=1)
+        root = np.cumsum(0.01 * rng.normal(size=(count, 3)), axis=0)
+        at = np.arange(count) / 30
+        scalars = {f"j{index + 1}": (at, angles[index]) for index in range(bodies - 1)}
+        made.append(tumble.Clip(at, keys[None], layout="track", names=["root"], translations=[root], scalars=scalars))
+    return tumble.MotionLibrary(made, robot=tumble.Robot.load(file), order="wxyz")
 
 
 def main() -> None:

@@ -203,7 +203,8 @@ pub mod trees {
 
     pub use crate::pose::tree::{
         BodyMotion, BodyOrder, BodyPose, BodyVelocity, Configuration, ConfigurationRates,
-        JointCounts, JointKind, Mimic, Siblings, Tree, TreeBody, TreeError, TreeJoint,
+        FrameWords, JointCounts, JointKind, JointTracks, Mimic, Siblings, Tree, TreeBody,
+        TreeError, TreeFrames, TreeJoint,
     };
 }
 

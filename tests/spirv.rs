@@ -94,7 +94,7 @@ fn every_float_operation_of_every_shader_is_decorated_once() {
         }
         // Copies of words, whole numbers but for a line, a rounding to halves, and products of rows as vectors.
         let least = match name {
-            "crowd_gather" | "crowd_scatter" | "motion_store" => 0,
+            "crowd_gather" | "crowd_scatter" | "motion_store" | "motion_pick" => 0,
             "crowd_half" => 1,
             "crowd_times" => 3,
             "crowd_skin" | "crowd_walk" | "crowd_walk_all" => 6,
@@ -165,7 +165,7 @@ fn the_pass_changes_nothing_the_second_time_and_can_be_undone() {
         assert_eq!(no_contraction(&passed).unwrap(), passed, "{name}");
         let bare = without_decorations(&passed).unwrap();
         // These copy words.
-        let has_floats = !["crowd_gather", "crowd_scatter", "motion_store"].contains(&name);
+        let has_floats = !["crowd_gather", "crowd_scatter", "motion_store", "motion_pick"].contains(&name);
         assert_eq!(bare.len() < passed.len(), has_floats, "{name}");
         assert_eq!(no_contraction(&bare).unwrap(), passed, "{name}");
     }

@@ -49,6 +49,10 @@ const CLOSED_STRUCTS: &[(&str, &str)] = &[
         "a transform is a translation, a rotation and a scale",
     ),
     ("VectorKeys", "times, keys and tangents"),
+    (
+        "crowd::BodyStates",
+        "memory of the caller, with a default for every part",
+    ),
     ("crowd::FrameStep", "two ticks and their distance"),
     ("crowd::MotionClip", "all that a clip is prepared of"),
     (
@@ -75,6 +79,14 @@ const CLOSED_STRUCTS: &[(&str, &str)] = &[
     (
         "trees::JointCounts",
         "the degrees of freedom of the kinds of joints",
+    ),
+    (
+        "trees::FrameWords",
+        "the words of a file, all of which are needed",
+    ),
+    (
+        "trees::JointTracks",
+        "a reader of robots must state every track",
     ),
     ("trees::Mimic", "a reader of robots must state every value"),
     (
@@ -105,7 +117,9 @@ const NOT_CLONED: &[(&str, &str)] = &[
     ("OutputBuffer", "it is large memory"),
     ("Samples", "it is large memory; copy its slice"),
     ("Transforms", "it has samples"),
+    ("crowd::BodyStates", "it lends memory of the caller"),
     ("crowd::Crowd", "it is on its device"),
+    ("crowd::DeviceBodies", "it is on its device"),
     ("crowd::DeviceMotions", "it is on its device"),
     ("crowd::MappedStates", "it is memory of its device"),
     ("crowd::MotionStates", "it lends memory of the caller"),

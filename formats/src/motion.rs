@@ -20,6 +20,7 @@ pub mod reduce;
 pub mod retime;
 pub mod root_motion;
 pub mod sample;
+pub mod scalar_tracks;
 pub mod scalars;
 mod select;
 pub mod signs;

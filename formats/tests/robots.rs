@@ -6,6 +6,7 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use proptest::prelude::*;
+use tumble::crowd::{BodyStates, BodyTables, KeyPrecision, MotionBuilder};
 use tumble::glam::{DQuat, DVec3};
 use tumble::trees::{
     BodyMotion, BodyOrder, BodyPose, BodyVelocity, Configuration, ConfigurationRates, JointKind,
@@ -13,8 +14,9 @@ use tumble::trees::{
 };
 use tumble::{Device, Ends, Engine, Interpolation, Layout, SampleTimes, ScalarQuantity, TrackSet};
 use tumble::{VectorMethod, method};
+use tumble_formats::motion::Motion;
 use tumble_formats::npy::read_numbers;
-use tumble_formats::robot::{Robot, RobotFormat};
+use tumble_formats::robot::{Robot, RobotFormat, RobotTracks};
 use tumble_formats::{Code, Diagnostic, Location};
 
 use crate::support::shared_data;
@@ -95,6 +97,188 @@ fn at_qpos(tree: &Tree, mut q: &[f64], mut v: &[f64]) -> (Configuration, Configu
         (q, v) = (&q[values..], &v[of_rates..]);
     }
     (configuration, rates)
+}
+
+/// The joints of a robot without a free joint at the numbers of a file.
+fn at_base(tree: &Tree, arrays: &mut Arrays) -> Vec<(Configuration, ConfigurationRates)> {
+    let [
+        positions,
+        rates,
+        root_positions,
+        root_rotations,
+        linear,
+        angular,
+    ] = [
+        "joint_pos",
+        "joint_vel",
+        "root_pos",
+        "root_quat",
+        "root_lin_vel",
+        "root_ang_vel",
+    ]
+    .map(|name| arrays.rows(name));
+    let at = |row: usize| {
+        let configuration = Configuration {
+            base: BodyPose {
+                position: DVec3::from_slice(&root_positions[row]),
+                rotation: quaternion(&root_rotations[row]),
+            },
+            scalars: positions[row].clone(),
+            ..tree.rest()
+        };
+        let of_base = BodyVelocity {
+            linear: DVec3::from_slice(&linear[row]),
+            angular: DVec3::from_slice(&angular[row]),
+        };
+        let rates = ConfigurationRates {
+            base: of_base,
+            scalars: rates[row].clone(),
+            ..tree.no_rates()
+        };
+        (configuration, rates)
+    };
+    (0..positions.len()).map(at).collect()
+}
+
+/// An eighth of a second, in whose middle the joints have these values and rates.
+fn clip_around(tree: &Tree, at: &Configuration, rates: &ConfigurationRates) -> Motion {
+    const HALF: f64 = 1.0 / 16.0;
+    let (mut motion, times) = (Motion::default(), [0.0, 2.0 * HALF]);
+    let ends = |rate: DVec3| [-HALF * rate, HALF * rate];
+    let turned = |rotation: DQuat, spin: DVec3| {
+        ends(spin).map(|turn| (DQuat::from_scaled_axis(turn) * rotation).as_quat())
+    };
+    let moved = |set: &mut TrackSet, name: &str, pose: BodyPose, rate: BodyVelocity| {
+        let keys = turned(pose.rotation.normalize(), rate.angular);
+        let track = set.track_count();
+        set.push(name, &times, &keys).unwrap();
+        let points = ends(rate.linear).map(|step| (pose.position + step).as_vec3());
+        set.set_translations(track, &times, &points, &[]).unwrap();
+    };
+    if at.free.is_empty() {
+        moved(&mut motion.set, &tree.bodies()[0].name, at.base, rates.base);
+    }
+    let (mut free, mut ball, mut scalar) = (0, 0, 0);
+    for joint in tree.joints() {
+        let set = &mut motion.set;
+        match joint.kind {
+            JointKind::Free => {
+                moved(set, &joint.name, at.free[free], rates.free[free]);
+                free += 1;
+            }
+            JointKind::Ball => {
+                let rotation = at.balls[ball].normalize();
+                let keys = turned(rotation, rotation * rates.balls[ball]);
+                set.push(&*joint.name, &times, &keys).unwrap();
+                ball += 1;
+            }
+            JointKind::Hinge | JointKind::Slide if joint.mimic.is_none() => {
+                let (value, rate) = (at.scalars[scalar], rates.scalars[scalar]);
+                let keys = [-HALF, HALF].map(|time| (value + time * rate) as f32);
+                set.push_scalar(&joint.name, &times, &keys, &[]).unwrap();
+                scalar += 1;
+            }
+            JointKind::Hinge | JointKind::Slide => {}
+        }
+    }
+    motion
+}
+
+/// The bodies that a library in f32 has of these configurations, beside those of a file: the largest errors of positions
+/// and of rotations (rad), and those of velocities relative to the largest velocity.
+fn errors_of_library(
+    tree: &Tree,
+    configurations: &[(Configuration, ConfigurationRates)],
+    all: &[Vec<Vec<f64>>; 4],
+) -> [f64; 4] {
+    let clip = |(at, rates): &(Configuration, ConfigurationRates)| clip_around(tree, at, rates);
+    let clips: Vec<Motion> = configurations.iter().map(clip).collect();
+    let tracks = RobotTracks::new(tree, &clips);
+    let order: Vec<usize> = (0..tree.bodies().len()).collect();
+    let frames = tracks.frames(&order, &[]).unwrap().with_w_first();
+    let ticks = 1 << 20;
+    let precision = KeyPrecision::Exact;
+    let mut builder = MotionBuilder::new(&tracks.skeleton().unwrap(), ticks, precision).unwrap();
+    for clip in &clips {
+        let set = tracks.set(clip).unwrap();
+        builder
+            .push(&set, method::SLERP, VectorMethod::Linear)
+            .unwrap();
+    }
+    let (tables, spans, cells) = builder.finish();
+    let tables = BodyTables::new(tables, frames).unwrap();
+    let at: Vec<(u32, u32)> = (0..clips.len())
+        .map(|clip| (clip as u32, ticks / 16))
+        .collect();
+    let count = clips.len() * order.len();
+    let mut vectors = [(); 3].map(|()| vec![[0f32; 3]; count]);
+    let mut rotations = vec![[0f32; 4]; count];
+    let [positions, velocities, angular_velocities] = &mut vectors;
+    let states = BodyStates {
+        positions,
+        rotations: &mut rotations,
+        velocities,
+        angular_velocities,
+        ..BodyStates::default()
+    };
+    let engine = Engine::new(Device::Cpu).unwrap();
+    let parts = (&spans[..], &cells[..]);
+    tables
+        .sample_into(&engine, parts, &at, None, states)
+        .unwrap();
+    let of_file = |rows: &[Vec<f64>]| rows.concat();
+    let apart = |found: &[[f32; 3]], rows: &[Vec<f64>]| {
+        let pairs = found.iter().zip(of_file(rows).as_chunks::<3>().0.to_vec());
+        let distance = |(found, expected): (&[f32; 3], [f64; 3])| {
+            DVec3::from_array(found.map(f64::from)).distance(DVec3::from_array(expected))
+        };
+        pairs.map(distance).fold(0.0, f64::max)
+    };
+    let largest = |rows: &[Vec<f64>]| of_file(rows).iter().fold(0f64, |a, b| a.max(b.abs()));
+    let pairs = rotations
+        .iter()
+        .zip(of_file(&all[1]).as_chunks::<4>().0.to_vec());
+    let angles = pairs.map(|(found, expected)| {
+        let [found, expected] = [found.map(f64::from), expected].map(|q| quaternion(&q));
+        2.0 * (found - expected).length().min((found + expected).length())
+    });
+    [
+        apart(&vectors[0], &all[0]),
+        angles.fold(0.0, f64::max),
+        apart(&vectors[1], &all[2]) / largest(&all[2]),
+        apart(&vectors[2], &all[3]) / largest(&all[3]),
+    ]
+}
+
+/// The bound that `docs/robots.md` states.
+#[test]
+fn bodies_of_libraries_are_those_of_mujoco_and_pinocchio() {
+    for (file, expected) in [
+        ("tangle.xml", "tangle.npz"),
+        ("pico.xml", "pico.npz"),
+        ("claw.urdf", "claw_urdf.npz"),
+    ] {
+        let Some(mut arrays) = Arrays::open(expected) else {
+            return;
+        };
+        let tree = robot(file).tree;
+        let configurations: Vec<_> = match tree.counts().free {
+            0 => at_base(&tree, &mut arrays),
+            _ => {
+                let (qpos, qvel) = (arrays.rows("qpos"), arrays.rows("qvel"));
+                let at = |(q, v): (&Vec<f64>, &Vec<f64>)| at_qpos(&tree, q, v);
+                qpos.iter().zip(&qvel).map(at).collect()
+            }
+        };
+        let errors = errors_of_library(&tree, &configurations, &bodies(&mut arrays));
+        println!("{file}: {errors:?}");
+        let bounds = [1e-6, 2e-6, 1e-5, 1e-5];
+        let is_within = errors
+            .iter()
+            .zip(bounds)
+            .all(|(&error, bound)| error < bound);
+        assert!(is_within, "{file}: {errors:?}");
+    }
 }
 
 /// The largest differences of positions and velocities, and of rotations.
@@ -213,42 +397,9 @@ fn bodies_of_urdf_are_where_pinocchio_has_them() {
         assert_eq!(robot.format, RobotFormat::Urdf);
         let tree = &robot.tree;
         let all = bodies(&mut arrays);
-        let [
-            positions,
-            rates,
-            root_positions,
-            root_rotations,
-            linear,
-            angular,
-        ] = [
-            "joint_pos",
-            "joint_vel",
-            "root_pos",
-            "root_quat",
-            "root_lin_vel",
-            "root_ang_vel",
-        ]
-        .map(|name| arrays.rows(name));
         let mut largest = [0f64; 2];
-        for row in 0..positions.len() {
-            let configuration = Configuration {
-                base: BodyPose {
-                    position: DVec3::from_slice(&root_positions[row]),
-                    rotation: quaternion(&root_rotations[row]),
-                },
-                scalars: positions[row].clone(),
-                ..tree.rest()
-            };
-            let of_base = BodyVelocity {
-                linear: DVec3::from_slice(&linear[row]),
-                angular: DVec3::from_slice(&angular[row]),
-            };
-            let rates = ConfigurationRates {
-                base: of_base,
-                scalars: rates[row].clone(),
-                ..tree.no_rates()
-            };
-            let motions = tree.motions(&configuration, &rates).unwrap();
+        for (row, (configuration, rates)) in at_base(tree, &mut arrays).iter().enumerate() {
+            let motions = tree.motions(configuration, rates).unwrap();
             let [vectors, rotations] = differences(&motions, row, &all);
             largest = [largest[0].max(vectors), largest[1].max(rotations)];
         }

@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use numpy::PyReadonlyArray1;
 use pyo3::prelude::*;
-use tumble::crowd::{FrameStep, StateArray};
+use tumble::UnknownNameError;
+use tumble::crowd::{BodyArray, CrowdError, DeviceBodies, FrameStep, MappedStates, StateArray};
 use tumble::vulkan::{ExportedResult, VulkanError};
 use tumble::{Encoding, EncodingOptions};
 
@@ -13,17 +14,85 @@ use crate::cuda::CudaError;
 use crate::device_array::DeviceArray;
 use crate::engine::Engine;
 use crate::errors::{device, guarded, input};
-use crate::motions::{MANY, Motions, of_crowd};
+use crate::motions::{MANY, Motions, Tables, of_crowd};
 use crate::output::encoding_named;
 use crate::run::stoppable;
 
 /// The clips of a motion library on a device, which samples them there.
 #[pyclass(frozen, weakref, module = "tumble._tumble")]
 pub(crate) struct DeviceMotions {
-    device: tumble::crowd::DeviceMotions,
+    device: OnDevice,
     motions: Py<Motions>,
     /// Whether CUDA has the device, so that results stay in its memory.
     is_on_card: bool,
+}
+
+/// The tables on a device.
+enum OnDevice {
+    Skeleton(tumble::crowd::DeviceMotions),
+    Robot(DeviceBodies),
+}
+
+/// The memory of a result, and the ranges of its arrays.
+type Arrays<T> = Result<(T, Vec<std::ops::Range<usize>>), CrowdError>;
+
+/// The arrays that are asked for.
+enum Asked {
+    /// With the encoding of rotations.
+    OfJoints(Vec<StateArray>, Encoding),
+    OfBodies(Vec<BodyArray>),
+}
+
+impl OnDevice {
+    fn bytes(&self) -> u64 {
+        match self {
+            Self::Skeleton(device) => device.bytes(),
+            Self::Robot(device) => device.bytes(),
+        }
+    }
+
+    fn asked(&self, names: &[String], rotations: Encoding) -> PyResult<Asked> {
+        fn parsed<T: std::str::FromStr<Err = UnknownNameError>>(
+            names: &[String],
+        ) -> PyResult<Vec<T>> {
+            let parsed: Result<_, UnknownNameError> = names.iter().map(|it| it.parse()).collect();
+            parsed.map_err(|error| input(format!("arrays: {error}")))
+        }
+        Ok(match self {
+            Self::Skeleton(_) => Asked::OfJoints(parsed(names)?, rotations),
+            Self::Robot(_) => Asked::OfBodies(parsed(names)?),
+        })
+    }
+
+    fn sample(
+        &self,
+        at: &[(u32, u32)],
+        steps: Option<&[FrameStep]>,
+        asked: &Asked,
+    ) -> Arrays<MappedStates> {
+        match (self, asked) {
+            (Self::Skeleton(device), Asked::OfJoints(arrays, rotations)) => {
+                device.sample(at, steps, arrays, *rotations)
+            }
+            (Self::Robot(device), Asked::OfBodies(arrays)) => device.sample(at, steps, arrays),
+            _ => Err(CrowdError::BrokenTables), // cannot happen: `asked` makes those of the device
+        }
+    }
+
+    fn export(
+        &self,
+        at: &[(u32, u32)],
+        steps: Option<&[FrameStep]>,
+        asked: &Asked,
+    ) -> Arrays<ExportedResult> {
+        match (self, asked) {
+            (Self::Skeleton(device), Asked::OfJoints(arrays, rotations)) => {
+                device.export(at, steps, arrays, *rotations)
+            }
+            (Self::Robot(device), Asked::OfBodies(arrays)) => device.export(at, steps, arrays),
+            _ => Err(CrowdError::BrokenTables), // as above
+        }
+    }
 }
 
 /// The reason why results do not stay on the card.
@@ -59,12 +128,22 @@ impl DeviceMotions {
         }
         let of_tables = motions.get();
         let device = of_tables.with_parts(py, |tables, parts| {
-            guarded(|| tumble::crowd::DeviceMotions::new(&engine, tables, parts).map_err(of_crowd))
+            let device = || match &of_tables.tables {
+                Tables::Skeleton(_) => {
+                    let device = tumble::crowd::DeviceMotions::new(&engine, tables, parts);
+                    device.map(OnDevice::Skeleton)
+                }
+                Tables::Robot(tables) => {
+                    DeviceBodies::new(&engine, tables, parts).map(OnDevice::Robot)
+                }
+            };
+            guarded(|| device().map_err(of_crowd))
         })?;
         let is_on_card = py.detach(|| {
-            guarded(|| match device.export(&[], None, &[], Encoding::F32) {
+            let none = device.asked(&[], Encoding::F32)?;
+            guarded(|| match device.export(&[], None, &none) {
                 Ok((result, _)) => is_on_card(result),
-                Err(tumble::crowd::CrowdError::Vulkan(VulkanError::NoExport { .. })) => Ok(false),
+                Err(CrowdError::Vulkan(VulkanError::NoExport { .. })) => Ok(false),
                 Err(error) => Err(of_crowd(error)),
             })
         })?;
@@ -96,14 +175,11 @@ impl DeviceMotions {
         frames: Option<(PyReadonlyArray1<'_, f64>, PyReadonlyArray1<'_, f64>)>,
     ) -> PyResult<Vec<DeviceArray>> {
         let motions = self.motions.get();
-        let arrays = names.iter().map(|name| name.parse());
-        let arrays: Vec<StateArray> = arrays
-            .collect::<Result<_, _>>()
-            .map_err(|error: tumble::UnknownNameError| input(format!("arrays: {error}")))?;
         let encoding = match rotations {
             "quaternion" => Encoding::F32,
             other => encoding_named(other, EncodingOptions::default())?,
         };
+        let asked = self.device.asked(&names, encoding)?;
         let at = motions.instances(&clip_ids, &times)?;
         let steps: Option<Vec<FrameStep>> = match &frames {
             Some((rates, lengths)) => {
@@ -114,18 +190,36 @@ impl DeviceMotions {
         };
         let are_placed =
             |array: &StateArray| matches!(array, StateArray::Positions | StateArray::Velocities);
-        if arrays.iter().any(are_placed) {
-            motions.check_placed(&at)?;
-        }
+        // The numbers of an instance in each array, as the axes of its shape.
+        let axes: Vec<Vec<usize>> = match (&asked, &motions.tables) {
+            (Asked::OfBodies(arrays), Tables::Robot(tables)) => {
+                let frames = tables.frames();
+                let of = |array: &BodyArray| match array.is_of_joints() {
+                    true => vec![frames.scalar_count()],
+                    false => vec![frames.body_count(), array.numbers()],
+                };
+                arrays.iter().map(of).collect()
+            }
+            (Asked::OfJoints(arrays, rotations), _) => {
+                if arrays.iter().any(are_placed) {
+                    motions.check_placed(&at)?;
+                }
+                let of = |array: &StateArray| {
+                    [&[motions.joints()][..], array.encoding(*rotations).shape()].concat()
+                };
+                arrays.iter().map(of).collect()
+            }
+            _ => Vec::new(),
+        };
         let work = || match self.is_on_card {
             true => {
-                let made = (self.device).export(&at, steps.as_deref(), &arrays, encoding);
+                let made = self.device.export(&at, steps.as_deref(), &asked);
                 let (result, ranges) = made.map_err(of_crowd)?;
                 let memory = ArrayMemory::on_card(result).map_err(|error| of_cuda(&error))?;
                 Ok((memory, ranges))
             }
             false => {
-                let made = (self.device).sample(&at, steps.as_deref(), &arrays, encoding);
+                let made = self.device.sample(&at, steps.as_deref(), &asked);
                 let (states, ranges) = made.map_err(of_crowd)?;
                 Ok((ArrayMemory::Host(states), ranges))
             }
@@ -136,11 +230,10 @@ impl DeviceMotions {
             false => stoppable(work),
         })?;
         let memory = Arc::new(memory);
-        let array = |(array, range): (&StateArray, std::ops::Range<usize>)| {
-            let each = array.encoding(encoding).shape();
-            let shape = [&shape[..], &[motions.joints()], each].concat();
+        let array = |(axes, range): (&Vec<usize>, std::ops::Range<usize>)| {
+            let shape = [&shape[..], axes].concat();
             DeviceArray::within(&memory, range.start, shape)
         };
-        Ok(arrays.iter().zip(ranges).map(array).collect())
+        Ok(axes.iter().zip(ranges).map(array).collect())
     }
 }

@@ -1,6 +1,7 @@
 //! The tables behind `tumble.MotionLibrary`: clips of one skeleton, sampled at many times at once.
 
 pub(crate) mod frames;
+pub(crate) mod robots;
 pub(crate) mod scalars;
 
 use std::borrow::Cow;
@@ -15,9 +16,10 @@ use numpy::{
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use tumble::crowd::{
-    CrowdError, FrameStep, KeyPrecision, MotionBuilder, MotionClip, MotionStates, MotionTables,
-    MotionWords,
+    BodyTables, CrowdError, FrameStep, KeyPrecision, MotionBuilder, MotionClip, MotionStates,
+    MotionTables, MotionWords,
 };
+use tumble::trees::{FrameWords, TreeFrames};
 use tumble::{Channel, Device, EncodingOptions, Error, Method, Skeleton, VectorMethod, bytemuck};
 use tumble_formats::motion::Motion;
 use tumble_formats::sample::{ChannelMethods, MethodChoice};
@@ -49,7 +51,7 @@ pub(crate) const MANY: usize = 1 << 21;
 /// The clips of a motion library, prepared: what is sampled, and its arrays for files.
 #[pyclass(frozen, weakref, module = "tumble._tumble")]
 pub(crate) struct Motions {
-    tables: MotionTables,
+    pub(crate) tables: Tables,
     spans: Py<PyArray2<u32>>,
     cells: Py<PyArray2<f32>>,
     /// For each clip, the reason why it has no positions; empty if it has. No entries if all clips have positions.
@@ -58,6 +60,9 @@ pub(crate) struct Motions {
     /// The names of the joints; no entries in files that do not store them.
     #[pyo3(get)]
     joint_names: Vec<String>,
+    /// The names of a robot's bodies; no entries for a skeleton.
+    #[pyo3(get)]
+    body_names: Vec<String>,
     /// The clips that were left out because they do not fit: their indices in the list, and the reasons.
     #[pyo3(get)]
     skipped: Vec<SkippedClip>,
@@ -65,6 +70,23 @@ pub(crate) struct Motions {
 
 /// The index of a clip in a list, and the reason why it was left out.
 type SkippedClip = (usize, String);
+
+/// The tables of a library.
+pub(crate) enum Tables {
+    /// Joints of a skeleton.
+    Skeleton(MotionTables),
+    /// Joints and bodies of a robot.
+    Robot(BodyTables),
+}
+
+impl Tables {
+    fn motions(&self) -> &MotionTables {
+        match self {
+            Self::Skeleton(tables) => tables,
+            Self::Robot(tables) => tables.tables(),
+        }
+    }
+}
 
 /// The skeleton that the caller chose for all clips of a library or a crowd.
 pub(crate) enum ChosenSkeleton {
@@ -308,11 +330,33 @@ fn fitting(
         !skipped.iter().any(|(skipped, _)| Some(*skipped) == index)
     });
     match kept.is_empty() {
-        true => Err(input(format!(
-            "no clip fits the library; the first: {}",
-            skipped.first().map_or("", |(_, reason)| reason)
-        ))),
+        true => Err(none_fits(&skipped)),
         false => Ok((kept, skipped)),
+    }
+}
+
+/// The exception for a library all of whose clips were left out.
+fn none_fits(skipped: &[SkippedClip]) -> PyErr {
+    input(format!(
+        "no clip fits the library; the first: {}",
+        skipped.first().map_or("", |(_, reason)| reason)
+    ))
+}
+
+/// The ticks in a second for clips.
+fn ticks_for<'a>(clips: impl IntoIterator<Item = &'a Motion>) -> u32 {
+    let longest = clips.into_iter().map(length).fold(1e-3, f64::max);
+    let whole = (LONGEST / longest / f64::from(TICKS)).floor().min(FINEST);
+    match whole >= 1.0 {
+        true => whole as u32 * TICKS,
+        false => (LONGEST / longest).max(1.0) as u32,
+    }
+}
+
+fn precision_of(packed: bool) -> KeyPrecision {
+    match packed {
+        true => KeyPrecision::Packed,
+        false => KeyPrecision::Exact,
     }
 }
 
@@ -342,25 +386,21 @@ impl From<CrowdError> for ClipFault {
 type BuiltTables = (MotionTables, Vec<[u32; 4]>, Vec<[f32; 4]>);
 
 /// The tables of clips, each of which is made by `clip`.
-fn built<'a>(
+fn built<'a, 'c>(
     skeleton: &Skeleton,
     (ticks_per_second, precision): (u32, KeyPrecision),
-    clips: &'a [Clip],
-    clip: impl Fn(ListedClip<'a>) -> PyResult<MotionClip<'a>> + Sync,
+    clips: &[ListedClip<'c>],
+    clip: impl Fn(usize, ListedClip<'c>) -> PyResult<MotionClip<'a>> + Sync,
 ) -> PyResult<BuiltTables> {
     let made = MotionBuilder::new(skeleton, ticks_per_second, precision);
     let mut builder = made.map_err(of_crowd)?;
     let engine = tumble::Engine::new(Device::Cpu).map_err(|it| of_engine(&it))?;
-    let listed = |index: usize| ListedClip {
-        index,
-        clip: &clips[index],
-    };
     let pushed = builder.push_all(&engine, clips.len(), |index| {
-        clip(listed(index)).map_err(ClipFault::NotMade)
+        clip(index, clips[index]).map_err(ClipFault::NotMade)
     });
     pushed.map_err(|(index, fault)| match fault {
         ClipFault::NotMade(error) => error,
-        ClipFault::NotPushed(error) => of_pushed(error, listed(index)),
+        ClipFault::NotPushed(error) => of_pushed(error, clips[index]),
     })?;
     Ok(builder.finish())
 }
@@ -379,10 +419,6 @@ impl Motions {
         skip: bool,
         packed: bool,
     ) -> PyResult<Self> {
-        let precision = match packed {
-            true => KeyPrecision::Packed,
-            false => KeyPrecision::Exact,
-        };
         let method = method_named(method)?;
         let tracks = |clips: &[Clip]| {
             clips
@@ -418,18 +454,16 @@ impl Motions {
         let prepared = py.detach(|| {
             stoppable(|| {
                 let skeleton = shared.of_engine()?;
-                let longest = clips.iter().map(|clip| length(&clip.motion));
-                let longest = longest.fold(1e-3, f64::max);
-                let whole = (LONGEST / longest / f64::from(TICKS)).floor().min(FINEST);
-                let ticks = match whole >= 1.0 {
-                    true => whole as u32 * TICKS,
-                    false => (LONGEST / longest).max(1.0) as u32,
-                };
-                built(&skeleton, (ticks, precision), &clips, |listed| {
+                let ticks = ticks_for(clips.iter().map(|clip| &*clip.motion));
+                let listed: Vec<_> = ListedClip::all(&clips).collect();
+                let options = (ticks, precision_of(packed));
+                built(&skeleton, options, &listed, |_, listed| {
                     motion_clip(&shared, listed, method)
                 })
             })
         })?;
+        let (tables, spans, cells) = prepared;
+        let prepared = (Tables::Skeleton(tables), spans, cells);
         Ok(Self {
             unplaced,
             skipped,
@@ -454,7 +488,7 @@ impl Motions {
         let [sizes, ..] = words::<2>(arrays, "sizes")?[..] else {
             return Err(of_crowd(CrowdError::BrokenTables));
         };
-        let words = MotionWords {
+        let of_tables = MotionWords {
             clips: words(arrays, "clips")?,
             bases: words(arrays, "bases")?,
             channels: words(arrays, "channels")?,
@@ -470,8 +504,25 @@ impl Motions {
             if !(parts.0.1.is_empty() && parts.1.1.is_empty()) {
                 return Err(of_crowd(CrowdError::BrokenTables));
             }
-            let tables = || MotionTables::new(words, (parts.0.0, parts.1.0)).map_err(of_crowd);
-            spans.py().detach(|| stoppable(tables))?
+            let tables = || MotionTables::new(of_tables, (parts.0.0, parts.1.0)).map_err(of_crowd);
+            let tables = spans.py().detach(|| stoppable(tables))?;
+            match arrays.contains(TREE_FRAMES)? {
+                false => Tables::Skeleton(tables),
+                true => {
+                    let bodies = words::<2>(arrays, TREE_BODIES)?;
+                    let scalars = words::<1>(arrays, TREE_SCALARS)?;
+                    let [[w_first], scalars @ ..] = &scalars[..] else {
+                        return Err(of_crowd(CrowdError::BrokenTables));
+                    };
+                    let frames = TreeFrames::of_words(&FrameWords {
+                        frames: words(arrays, TREE_FRAMES)?,
+                        bodies,
+                        scalars: scalars.as_flattened().to_vec(),
+                        is_w_first: *w_first != 0,
+                    });
+                    Tables::Robot(BodyTables::new(tables, frames).map_err(of_crowd)?)
+                }
+            }
         };
         let texts = |name: &str| match arrays.get_item(name)? {
             Some(array) => array.call_method0("tolist")?.extract::<Vec<String>>(),
@@ -483,6 +534,7 @@ impl Motions {
             cells: cells.unbind(),
             unplaced: texts("unplaced")?,
             joint_names: texts("joint_names")?,
+            body_names: texts("body_names")?,
             skipped: Vec::new(),
         })
     }
@@ -494,32 +546,46 @@ impl Motions {
         py: Python<'py>,
         clips: Option<ListArgument<usize>>,
     ) -> PyResult<Bound<'py, PyDict>> {
-        let Some(ListArgument(clips)) = clips else {
-            let parts = [self.spans.bind(py).as_any(), self.cells.bind(py).as_any()];
-            return arrays_of(py, self.tables.words(), parts);
+        let found = match clips {
+            None => {
+                let parts = [self.spans.bind(py).as_any(), self.cells.bind(py).as_any()];
+                arrays_of(py, self.tables.motions().words(), parts)?
+            }
+            Some(ListArgument(clips)) => {
+                let (tables, spans, cells) = self.with_parts(py, |tables, parts| {
+                    guarded(|| tables.select(parts, &clips).map_err(of_crowd))
+                })?;
+                let (spans, cells) = (spans_array(py, spans)?, cells_array(py, cells)?);
+                arrays_of(py, tables.words(), [spans.as_any(), cells.as_any()])?
+            }
         };
-        let (tables, spans, cells) = self.with_parts(py, |tables, parts| {
-            guarded(|| tables.select(parts, &clips).map_err(of_crowd))
-        })?;
-        let (spans, cells) = (spans_array(py, spans)?, cells_array(py, cells)?);
-        arrays_of(py, tables.words(), [spans.as_any(), cells.as_any()])
+        if let Tables::Robot(tables) = &self.tables {
+            let words = tables.frames().words();
+            put(&found, TREE_FRAMES, words.frames)?;
+            put(&found, TREE_BODIES, words.bodies)?;
+            let scalars = [u32::from(words.is_w_first)]
+                .into_iter()
+                .chain(words.scalars);
+            put(&found, TREE_SCALARS, scalars.map(|word| [word]).collect())?;
+        }
+        Ok(found)
     }
 
     /// Number of clips.
     fn __len__(&self) -> usize {
-        self.tables.clip_count()
+        self.tables.motions().clip_count()
     }
 
     /// Number of ticks in a second.
     #[getter]
     fn ticks_per_second(&self) -> u32 {
-        self.tables.ticks_per_second()
+        self.tables.motions().ticks_per_second()
     }
 
     /// Number of joints.
     #[getter]
     pub(crate) fn joints(&self) -> usize {
-        self.tables.joint_count()
+        self.tables.motions().joint_count()
     }
 
     /// The parent of each joint.
@@ -581,7 +647,8 @@ impl Motions {
         let [r, p, w, v, a] = &mut outputs[..] else {
             return Ok(());
         };
-        let joints = at.len() * self.tables.joint_count();
+        let motions = self.tables.motions();
+        let joints = at.len() * motions.joint_count();
         let states = MotionStates {
             rotations: rows(r, joints)?,
             positions: rows(p, joints)?,
@@ -592,8 +659,8 @@ impl Motions {
         let engine = engine.get().engine_for(1)?;
         let work = || {
             let sampled = match &steps {
-                Some(steps) => (self.tables).differences_into(&engine, tables, &at, steps, states),
-                None => self.tables.sample_into(&engine, tables, &at, states),
+                Some(steps) => motions.differences_into(&engine, tables, &at, steps, states),
+                None => motions.sample_into(&engine, tables, &at, states),
             };
             sampled.map_err(of_crowd)
         };
@@ -608,7 +675,7 @@ impl Motions {
     /// The library of tables, all of whose clips have positions.
     fn of_parts(
         py: Python<'_>,
-        (tables, spans, cells): BuiltTables,
+        (tables, spans, cells): (Tables, Vec<[u32; 4]>, Vec<[f32; 4]>),
         joint_names: Vec<String>,
     ) -> PyResult<Self> {
         Ok(Self {
@@ -617,6 +684,7 @@ impl Motions {
             cells: cells_array(py, cells)?.unbind(),
             unplaced: Vec::new(),
             joint_names,
+            body_names: Vec::new(),
             skipped: Vec::new(),
         })
     }
@@ -631,7 +699,7 @@ impl Motions {
         let cells = self.cells.bind(py).try_readonly()?;
         let spans = spans.as_slice()?.as_chunks().0;
         let cells = cells.as_slice()?.as_chunks().0;
-        py.detach(|| work(&self.tables, (spans, cells)))
+        py.detach(|| work(self.tables.motions(), (spans, cells)))
     }
 
     /// Fails if positions are requested of a clip whose joints have none.
@@ -652,7 +720,7 @@ impl Motions {
         times: &PyReadonlyArray1<'_, f64>,
         (rates, lengths): (&[f64], &[f64]),
     ) -> PyResult<Vec<FrameStep>> {
-        let per_second = f64::from(self.tables.ticks_per_second());
+        let per_second = f64::from(self.tables.motions().ticks_per_second());
         let step = |(&(clip, _), &time): (&(u32, u32), &f64)| {
             let (rate, length) = (rates[clip as usize], lengths[clip as usize]);
             // A time within a millionth of a frame counts as at the frame.
@@ -663,7 +731,7 @@ impl Motions {
                 per_second: rate as f32,
             }
         };
-        match rates.len() == self.tables.clip_count() && lengths.len() == rates.len() {
+        match rates.len() == self.tables.motions().clip_count() && lengths.len() == rates.len() {
             true => Ok(at.iter().zip(times.as_array()).map(step).collect()),
             false => Err(input("frames: give a rate and a length for each clip")),
         }
@@ -683,12 +751,13 @@ impl Motions {
                 ids.len()
             )));
         }
-        let per_second = f64::from(self.tables.ticks_per_second());
+        let per_second = f64::from(self.tables.motions().ticks_per_second());
         let one = |(index, (&clip, &time)): (usize, (&i64, &f64))| {
             let ticks = u32::try_from(clip).ok();
-            let ticks = ticks.and_then(|clip| Some((clip, self.tables.ticks(clip as usize)?)));
+            let ticks =
+                ticks.and_then(|clip| Some((clip, self.tables.motions().ticks(clip as usize)?)));
             let Some((clip, ticks)) = ticks else {
-                let count = self.tables.clip_count();
+                let count = self.tables.motions().clip_count();
                 return Err(input(format!(
                     "clip_ids[{index}]: there is no clip {clip}; there are {count}, from 0"
                 )));
@@ -765,21 +834,27 @@ fn cells_array(py: Python<'_>, cells: Vec<[f32; 4]>) -> PyResult<Bound<'_, PyArr
     PyArray1::from_vec(py, cells.into_flattened()).reshape([count, 4])
 }
 
+/// Arrays in which a file has the tree of a robot: its frames, its bodies, and its scalars behind whether w is first.
+const TREE_FRAMES: &str = "tree_frames";
+const TREE_BODIES: &str = "tree_bodies";
+const TREE_SCALARS: &str = "tree_scalars";
+
+fn put<const N: usize>(
+    found: &Bound<'_, PyDict>,
+    name: &str,
+    words: Vec<[u32; N]>,
+) -> PyResult<()> {
+    let count = words.len();
+    let flat = PyArray1::from_vec(found.py(), words.into_flattened());
+    found.set_item(name, flat.reshape([count, N])?)
+}
+
 /// Small tables, and the spans and cells that belong to them, as arrays by their names.
 fn arrays_of<'py>(
     py: Python<'py>,
     words: MotionWords,
     [spans, cells]: [&Bound<'py, PyAny>; 2],
 ) -> PyResult<Bound<'py, PyDict>> {
-    fn put<const N: usize>(
-        found: &Bound<'_, PyDict>,
-        name: &str,
-        words: Vec<[u32; N]>,
-    ) -> PyResult<()> {
-        let count = words.len();
-        let flat = PyArray1::from_vec(found.py(), words.into_flattened());
-        found.set_item(name, flat.reshape([count, N])?)
-    }
     let found = PyDict::new(py);
     put(&found, "clips", words.clips)?;
     put(&found, "bases", words.bases)?;

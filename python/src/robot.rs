@@ -235,6 +235,11 @@ impl Robot {
         &self.robot.tree
     }
 
+    /// The robot as files describe it.
+    pub(crate) fn described(&self) -> &robot::Robot {
+        &self.robot
+    }
+
     fn named(&self, kind: JointKind) -> Vec<&str> {
         let joints = self.tree().joints().filter(move |joint| joint.kind == kind);
         joints.map(|joint| &*joint.name).collect()
@@ -444,7 +449,7 @@ fn shaped<'py, T: Element>(
         .into_any())
 }
 
-fn of_bodies(error: &BodiesError) -> PyErr {
+pub(crate) fn of_bodies(error: &BodiesError) -> PyErr {
     match error {
         BodiesError::Engine(error) => of_engine(error),
         error => input(in_python(&error.to_string())),

@@ -25,7 +25,7 @@ use crate::rust::Declared;
 
 /// The functions that are written, each with its cut: the names of `let` after which a pipelined loop interrupts it.
 /// A function `f` with a cut is written as `f_begin` and `f_end`, too.
-const FUNCTIONS: [(&str, &[&str]); 37] = [
+const FUNCTIONS: [(&str, &[&str]); 38] = [
     ("canonical", &[]),
     ("flushed", &[]),
     ("flushed4", &[]),
@@ -63,6 +63,7 @@ const FUNCTIONS: [(&str, &[&str]); 37] = [
     ("inverse_rotated", &[]),
     ("canonical_product", &[]),
     ("small_angle_cubic", &[]),
+    ("turned", &[]),
 ];
 
 /// The functions that `tumble-exact` offers to other shaders, with those that they call, and the files that have them.

@@ -436,7 +436,7 @@ static WHOLE_READS: [Read; 6] = [
 ];
 
 /// Kernels over the states of a library's clips, each with the files that it needs beside the entry point.
-const MOTION: [(&str, &[&str]); 5] = [
+const MOTION: [(&str, &[&str]); 7] = [
     (
         "joints",
         &[
@@ -478,6 +478,18 @@ const MOTION: [(&str, &[&str]); 5] = [
     ),
     ("store", &["motion/store"]),
     ("matrices", &["math/matrix", "motion/matrices"]),
+    (
+        "tree",
+        &[
+            "math/sine_cosine",
+            "math/arc_tangent",
+            "math/quaternion",
+            "math/vector",
+            "math/turned",
+            "motion/tree",
+        ],
+    ),
+    ("pick", &["motion/pick"]),
 ];
 
 /// The files of the self-test.

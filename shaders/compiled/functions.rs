@@ -975,3 +975,19 @@ pub(crate) fn small_angle_cubic<N: Choice>(
             & !last.3.equals(N::all(KEY_UNKNOWN)),
     }
 }
+
+/// The rotation by an angle, up to 8192 rad in magnitude, about a unit axis.
+#[inline(always)]
+pub(crate) fn turned(axis: [f32; 3], angle: f32) -> [f32; 4] {
+    let half = angle * 0.5;
+    let shifted = half * QUARTERS_PER_RADIAN + WHOLE_SHIFT;
+    let quarters = shifted.to_bits();
+    let whole = shifted - WHOLE_SHIFT;
+    let rest = half - whole * QUARTER_1 - whole * QUARTER_2 - whole * QUARTER_3;
+    let sines = sine_cosine(rest);
+    let is_odd = quarters & 1 == 1;
+    let sign = if quarters & 2 == 2 { -1.0 } else { 1.0 };
+    let sine = (if is_odd { sines.1 } else { sines.0 }) * sign;
+    let cosine = (if is_odd { -sines.0 } else { sines.1 }) * sign;
+    [axis[0] * sine, axis[1] * sine, axis[2] * sine, cosine]
+}

@@ -7,10 +7,12 @@ use crate::crowd::states::{FrameStep, MotionTables, check_clips, check_steps};
 use crate::crowd_error::CrowdError;
 use crate::engine::Engine;
 use crate::gpu::external::ExportedResult;
-use crate::gpu::motion::{MappedStates, MotionSource, ResidentMotions, StateSteps, StatesRequest};
+use crate::gpu::motion::{
+    MappedStates, MotionSource, ResidentMotions, StateSteps, StatesRequest, TreeSource,
+};
 use crate::machine::error::EvaluateError;
 use crate::output::encoding::Encoding;
-use crate::output::states::StateArray;
+use crate::output::states::{StateArray, StoredArray};
 use crate::shader::MotionSample;
 
 /// The clips of [`MotionTables`] in the memory of a Vulkan device, which computes states of them. The states have the
@@ -55,22 +57,10 @@ impl DeviceMotions {
     pub fn new(
         engine: &Engine,
         tables: &MotionTables,
-        (spans, cells): (&[[u32; 4]], &[[f32; 4]]),
+        parts: (&[[u32; 4]], &[[f32; 4]]),
     ) -> Result<Self, CrowdError> {
-        tables.check_parts((spans, cells))?;
-        let opened = engine.opened().ok_or(CrowdError::OnCpu)?;
-        let source = MotionSource {
-            clips: &tables.clips,
-            bases: &tables.bases,
-            spans: bytemuck::cast_slice(spans),
-            channels: &tables.channels,
-            cells,
-            links: &tables.links,
-            joints: tables.joint_count() as u32,
-            ticks_per_second: tables.ticks_per_second(),
-        };
         Ok(Self {
-            resident: ResidentMotions::new(opened.engine(), &source)?,
+            resident: resident(engine, tables, parts, None)?,
             clips: tables.clip_count(),
         })
     }
@@ -99,9 +89,9 @@ impl DeviceMotions {
         arrays: &[StateArray],
         rotations: Encoding,
     ) -> Result<(MappedStates, Vec<Range<usize>>), CrowdError> {
-        let (states, ranges) = self.with_request((at, steps), (arrays, rotations), |request| {
-            self.resident.evaluate(request)
-        })?;
+        let stored = self.stored(arrays, rotations)?;
+        let work = |request: &StatesRequest<'_>| self.resident.evaluate(request);
+        let (states, ranges) = with_request(self.clips, (at, steps), &stored, work)?;
         Ok((states, ranges.into_iter().map(in_memory).collect()))
     }
 
@@ -118,19 +108,17 @@ impl DeviceMotions {
         arrays: &[StateArray],
         rotations: Encoding,
     ) -> Result<(ExportedResult, Vec<Range<usize>>), CrowdError> {
-        let (states, ranges) = self.with_request((at, steps), (arrays, rotations), |request| {
-            self.resident.export(request)
-        })?;
+        let stored = self.stored(arrays, rotations)?;
+        let work = |request: &StatesRequest<'_>| self.resident.export(request);
+        let (states, ranges) = with_request(self.clips, (at, steps), &stored, work)?;
         Ok((states, ranges.into_iter().map(in_memory).collect()))
     }
 
-    fn with_request<T>(
+    fn stored(
         &self,
-        (at, steps): (&[(u32, u32)], Option<&[FrameStep]>),
-        (arrays, rotations): (&[StateArray], Encoding),
-        work: impl FnOnce(&StatesRequest<'_>) -> Result<T, EvaluateError>,
-    ) -> Result<T, CrowdError> {
-        check_clips(self.clips, at)?;
+        arrays: &[StateArray],
+        rotations: Encoding,
+    ) -> Result<Vec<StoredArray>, CrowdError> {
         if !matches!(
             rotations,
             Encoding::F32 | Encoding::Matrix3x3(_) | Encoding::SixD
@@ -139,38 +127,73 @@ impl DeviceMotions {
                 encoding: rotations,
             });
         }
-        let sample = |&(clip, tick): &(u32, u32)| MotionSample { clip, tick };
-        let samples: Vec<MotionSample> = at.iter().map(sample).collect();
-        let steps = match steps {
-            None => None,
-            Some(steps) => {
-                check_steps(steps.len(), at.len())?;
-                let ends = [0, 1].map(|end: usize| {
-                    let sample = |(step, &(clip, _)): (&FrameStep, &(u32, u32))| MotionSample {
-                        clip,
-                        tick: step.ticks[end],
-                    };
-                    steps.iter().zip(at).map(sample).collect()
-                });
-                let rates = steps.iter().map(|step| step.per_second).collect();
-                Some(StateSteps { ends, rates })
-            }
-        };
-        let request = StatesRequest {
-            at: &samples,
-            steps,
-            arrays,
-            rotations,
-        };
-        work(&request).map_err(|error| match error {
-            EvaluateError::Vulkan(error) | EvaluateError::NoRoom(error) => error.into(),
-            EvaluateError::Set(error) => error.into(),
-        })
+        let joints = self.resident.joints();
+        let stored = |array: &StateArray| array.stored(joints, rotations);
+        Ok(arrays.iter().map(stored).collect())
     }
 }
 
+/// Copies tables to the engine's device.
+pub(super) fn resident(
+    engine: &Engine,
+    tables: &MotionTables,
+    (spans, cells): (&[[u32; 4]], &[[f32; 4]]),
+    tree: Option<TreeSource<'_>>,
+) -> Result<ResidentMotions, CrowdError> {
+    tables.check_parts((spans, cells))?;
+    let opened = engine.opened().ok_or(CrowdError::OnCpu)?;
+    let source = MotionSource {
+        clips: &tables.clips,
+        bases: &tables.bases,
+        spans: bytemuck::cast_slice(spans),
+        channels: &tables.channels,
+        cells,
+        links: &tables.links,
+        joints: tables.joint_count() as u32,
+        ticks_per_second: tables.ticks_per_second(),
+        tree,
+    };
+    Ok(ResidentMotions::new(opened.engine(), &source)?)
+}
+
+/// Runs work on the instances of a call, of so many clips.
+pub(super) fn with_request<T>(
+    clips: usize,
+    (at, steps): (&[(u32, u32)], Option<&[FrameStep]>),
+    arrays: &[StoredArray],
+    work: impl FnOnce(&StatesRequest<'_>) -> Result<T, EvaluateError>,
+) -> Result<T, CrowdError> {
+    check_clips(clips, at)?;
+    let sample = |&(clip, tick): &(u32, u32)| MotionSample { clip, tick };
+    let samples: Vec<MotionSample> = at.iter().map(sample).collect();
+    let steps = match steps {
+        None => None,
+        Some(steps) => {
+            check_steps(steps.len(), at.len())?;
+            let ends = [0, 1].map(|end: usize| {
+                let sample = |(step, &(clip, _)): (&FrameStep, &(u32, u32))| MotionSample {
+                    clip,
+                    tick: step.ticks[end],
+                };
+                steps.iter().zip(at).map(sample).collect()
+            });
+            let rates = steps.iter().map(|step| step.per_second).collect();
+            Some(StateSteps { ends, rates })
+        }
+    };
+    let request = StatesRequest {
+        at: &samples,
+        steps,
+        arrays,
+    };
+    work(&request).map_err(|error| match error {
+        EvaluateError::Vulkan(error) | EvaluateError::NoRoom(error) => error.into(),
+        EvaluateError::Set(error) => error.into(),
+    })
+}
+
 /// A range of memory that exists.
-fn in_memory(range: Range<u64>) -> Range<usize> {
+pub(super) fn in_memory(range: Range<u64>) -> Range<usize> {
     range.start as usize..range.end as usize
 }
 

@@ -16,6 +16,7 @@
 //!   With the feature `vulkan`, a `CrowdStage` continues matrices in a buffer that the application has changed.
 //! * [`MotionTables`] and [`MotionStates`]: clips without instances, for the training of models of motion.
 //!   [`MotionBuilder`] collects them. With the feature `vulkan`, a `DeviceMotions` has them on a device.
+//! * [`BodyTables`] and [`BodyStates`]: the same for a robot's joints and bodies; on a device, `DeviceBodies`.
 //!
 //! # Steps
 //!
@@ -43,9 +44,12 @@
 // tables stay; entries that changed are written with the next
 // evaluation; positions live for a window alone.
 
+pub(crate) mod body_states;
 pub(crate) mod channel_curve;
 pub(crate) mod clip_keys;
 pub(crate) mod clip_tables;
+#[cfg(feature = "vulkan")]
+pub(crate) mod device_bodies;
 #[cfg(feature = "vulkan")]
 pub(crate) mod device_motions;
 pub(crate) mod events;
@@ -58,8 +62,12 @@ pub(crate) mod on_cpu;
 pub(crate) mod player;
 pub(crate) mod stages;
 pub(crate) mod states;
+mod tree_walk;
 
+pub use crate::crowd::body_states::{BodyStates, BodyTables};
 pub use crate::crowd::clip_keys::KeyPrecision;
+#[cfg(feature = "vulkan")]
+pub use crate::crowd::device_bodies::DeviceBodies;
 #[cfg(feature = "vulkan")]
 pub use crate::crowd::device_motions::DeviceMotions;
 pub use crate::crowd::events::{ClipEvent, PassedEvent};
@@ -75,4 +83,4 @@ pub use crate::gpu::motion::MappedStates;
 pub use crate::output::crowd::CrowdStage;
 pub use crate::output::crowd::{CrowdOutput, CrowdValues};
 #[cfg(feature = "vulkan")]
-pub use crate::output::states::StateArray;
+pub use crate::output::states::{BodyArray, StateArray};

@@ -29,7 +29,7 @@ use crate::twin::crowd_times::position_at;
 use crate::twin::quaternion::rotated;
 
 /// The number of instances in a task.
-const TASK: usize = 64;
+pub(super) const TASK: usize = 64;
 
 /// The number of guesses before spans are searched.
 const GUESSES: usize = 4;
@@ -571,7 +571,7 @@ struct StateScratch {
 
 /// Scratch memory for one pose.
 #[derive(Default)]
-struct PoseScratch {
+pub(super) struct PoseScratch {
     /// The clip of the previous pose, and the positions of its time bases.
     clip: Option<u32>,
     positions: Vec<CrowdPosition>,
@@ -583,9 +583,20 @@ struct PoseScratch {
     rates: Vec<[f32; 4]>,
 }
 
+impl PoseScratch {
+    pub(super) fn resize<L: Lanes>(&mut self, joints: usize) {
+        for memory in &mut self.keys {
+            memory.resize(joints, [0.0; 4]);
+        }
+        for memory in self.arcs.iter_mut().chain([&mut self.rates]) {
+            memory.resize(joints + L::COUNT, [0.0; 4]);
+        }
+    }
+}
+
 /// The states of as many instances as a vector has lanes, `[joint][instance]`. Positions and velocities end in a 0.
 #[derive(Default)]
-struct StateRows {
+pub(super) struct StateRows {
     rotations: Vec<[f32; 4]>,
     positions: Vec<[f32; 4]>,
     velocities: Vec<[f32; 4]>,
@@ -594,18 +605,18 @@ struct StateRows {
 
 /// A joint in its parent's frame, or in the world.
 #[derive(Clone, Copy)]
-struct Joint<N> {
-    rotation: [N; 4],
-    position: [N; 3],
-    velocity: [N; 3],
-    angular_velocity: [N; 3],
+pub(super) struct Joint<N> {
+    pub(super) rotation: [N; 4],
+    pub(super) position: [N; 3],
+    pub(super) velocity: [N; 3],
+    pub(super) angular_velocity: [N; 3],
 }
 
 /// The numbers of a joint's state.
 const JOINT_NUMBERS: usize = 13;
 
 impl StateRows {
-    fn resize(&mut self, count: usize) {
+    pub(super) fn resize(&mut self, count: usize) {
         for rows in [
             &mut self.rotations,
             &mut self.positions,
@@ -674,22 +685,28 @@ impl StateRows {
     /// Sets the velocities of an instance to the difference of two states, divided by the time between them,
     /// `1 / per_second`.
     #[inline(always)]
-    fn differ(&mut self, at: usize, [before, after]: [&Self; 2], per_second: f32) {
-        let [x, y, z, _] = before.positions[at];
-        let [a, b, c, _] = after.positions[at];
-        let [x, y, z] = scaled(sum([a, b, c], [-x, -y, -z]), per_second).map(canonical);
-        self.velocities[at] = [x, y, z, 0.0];
-        let [x, y, z, w] = before.rotations[at];
-        let [x, y, z, w] = product(after.rotations[at], [-x, -y, -z, w]).map(flushed);
-        let sine = root(x * x + y * y + z * z);
-        // The shorter arc, by the rotation vector's length; 0 if the angle is.
-        let scale = match sine == 0.0 {
-            true => 0.0,
-            false => 2.0 * arc_tangent(sine, w.abs()) * reciprocal(sine),
+    fn differ(&mut self, at: usize, ends: [&Self; 2], per_second: f32) {
+        let [before, after] = ends.map(|end| end.state(at, false));
+        let mut state = self.state(at, false);
+        state.differ(&before, &after, per_second);
+        let ([x, y, z], [a, b, c]) = (state.velocity, state.angular_velocity);
+        (self.velocities[at], self.angular_velocities[at]) = ([x, y, z, 0.0], [a, b, c, 0.0]);
+    }
+
+    /// One state; its velocities are 0 unless it moves.
+    #[inline(always)]
+    pub(super) fn state(&self, at: usize, moves: bool) -> Joint<f32> {
+        let three = |[x, y, z, _]: [f32; 4]| [x, y, z];
+        let velocity = |rows: &[[f32; 4]]| match moves {
+            true => three(rows[at]),
+            false => [0.0; 3],
         };
-        let scale = if w < 0.0 { -scale } else { scale };
-        let [x, y, z] = scaled([x, y, z], scale * per_second).map(canonical);
-        self.angular_velocities[at] = [x, y, z, 0.0];
+        Joint {
+            rotation: self.rotations[at],
+            position: three(self.positions[at]),
+            velocity: velocity(&self.velocities),
+            angular_velocity: velocity(&self.angular_velocities),
+        }
     }
 }
 
@@ -731,6 +748,25 @@ impl<L: Lanes> Joint<L> {
                 number.store_unordered(lanes);
             }
         }
+    }
+}
+
+impl Joint<f32> {
+    /// Sets the velocities to the difference of two states, divided by the time between them, `1 / per_second`.
+    #[inline(always)]
+    pub(super) fn differ(&mut self, before: &Self, after: &Self, per_second: f32) {
+        let [x, y, z] = before.position.map(|coordinate| -coordinate);
+        self.velocity = scaled(sum(after.position, [x, y, z]), per_second).map(canonical);
+        let [x, y, z, w] = before.rotation;
+        let [x, y, z, w] = product(after.rotation, [-x, -y, -z, w]).map(flushed);
+        let sine = root(x * x + y * y + z * z);
+        // The shorter arc, by the rotation vector's length; 0 if the angle is.
+        let scale = match sine == 0.0 {
+            true => 0.0,
+            false => 2.0 * arc_tangent(sine, w.abs()) * reciprocal(sine),
+        };
+        let scale = if w < 0.0 { -scale } else { scale };
+        self.angular_velocity = scaled([x, y, z], scale * per_second).map(canonical);
     }
 }
 
@@ -804,7 +840,7 @@ struct StatesTask<'a, 'b> {
 
 /// Which values of a pose are computed.
 #[derive(Clone, Copy, PartialEq, PartialOrd)]
-enum PoseValues {
+pub(super) enum PoseValues {
     /// Rotations in the parents' frames.
     Rotations,
     /// Rotations and positions in the world, too.
@@ -845,12 +881,7 @@ impl InLanes for StatesTask<'_, '_> {
             }
         }
         walk.resize(joints * JOINT_NUMBERS * L::COUNT, 0.0);
-        for memory in &mut pose.keys {
-            memory.resize(joints, [0.0; 4]);
-        }
-        for memory in pose.arcs.iter_mut().chain([&mut pose.rates]) {
-            memory.resize(joints + L::COUNT, [0.0; 4]);
-        }
+        pose.resize::<L>(joints);
         let is_posed = values_of_pose > PoseValues::Rotations || !states.rotations.is_empty();
         for (group, instances) in self.at.chunks(L::COUNT).enumerate() {
             let first = group * L::COUNT;
@@ -930,17 +961,17 @@ fn put<T>(
 
 /// The poses of a library's clips.
 #[derive(Clone, Copy)]
-struct Poses<'a> {
-    tables: &'a MotionTables,
-    spans: &'a [CrowdSpan],
-    cells: &'a [[f32; 4]],
+pub(super) struct Poses<'a> {
+    pub(super) tables: &'a MotionTables,
+    pub(super) spans: &'a [CrowdSpan],
+    pub(super) cells: &'a [[f32; 4]],
 }
 
 impl Poses<'_> {
     /// Computes the pose of a clip at a tick: rotations in the parents' frames to `local`, and all states in the parents'
     /// frames to the rows of a lane.
     #[inline(always)]
-    fn compute<L: Lanes>(
+    pub(super) fn compute<L: Lanes>(
         &self,
         (clip, tick): (u32, u32),
         values_of_pose: PoseValues,

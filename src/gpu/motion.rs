@@ -17,12 +17,13 @@ use crate::gpu::recorded::{Binding, Recorded};
 use crate::gpu::submission::Submission;
 use crate::gpu::upload::Upload;
 use crate::machine::error::{EvaluateError, VulkanError};
-use crate::output::encoding::Encoding;
-use crate::output::states::StateArray;
-use crate::shader::{CrowdBase, CrowdChannel, CrowdClip, CrowdLink, CrowdSpan, MotionSample};
+use crate::output::states::StoredArray;
+use crate::shader::{
+    CrowdBase, CrowdChannel, CrowdClip, CrowdLink, CrowdSpan, MotionSample, TreeFrame,
+};
 use crate::threads::exclusive::Exclusive;
 use crate::threads::stop;
-use crate::work::motion::{StatesResources, StatesShape, record_window};
+use crate::work::motion::{StatesResources, StatesShape, TreeResources, record_window};
 
 /// Windows begin at multiples of so many instances. Their arrays then begin where kernels can bind them.
 const LEAST_WINDOW: u64 = 64;
@@ -44,15 +45,21 @@ pub(crate) struct MotionSource<'a> {
     pub(crate) links: &'a [CrowdLink],
     pub(crate) joints: u32,
     pub(crate) ticks_per_second: u32,
+    pub(crate) tree: Option<TreeSource<'a>>,
+}
+
+/// The tables of a robot's tree.
+pub(crate) struct TreeSource<'a> {
+    pub(crate) frames: &'a [TreeFrame],
+    /// The words of the states that arrays have.
+    pub(crate) picks: &'a [u32],
 }
 
 /// The instances whose states are computed. Every clip exists.
 pub(crate) struct StatesRequest<'a> {
     pub(crate) at: &'a [MotionSample],
     pub(crate) steps: Option<StateSteps>,
-    pub(crate) arrays: &'a [StateArray],
-    /// That of rotations: quaternions in f32, or numbers of matrices.
-    pub(crate) rotations: Encoding,
+    pub(crate) arrays: &'a [StoredArray],
 }
 
 /// The samples between which velocities are differences, of each instance.
@@ -73,10 +80,18 @@ pub(crate) struct ResidentMotions {
     channels: Buffer,
     cells: Buffer,
     links: Buffer,
+    tree: Option<ResidentTree>,
     bytes: u64,
     joints: u32,
     link_count: u32,
     ticks_per_second: f32,
+}
+
+/// The tables of a robot's tree on a device.
+struct ResidentTree {
+    frames: Buffer,
+    picks: Buffer,
+    frame_count: u32,
 }
 
 /// The memory of work, which is kept for the next call.
@@ -86,6 +101,8 @@ struct StatesWork {
     samples: Upload,
     rates: Upload,
     states: Option<Buffer>,
+    /// The states of frames of a robot's tree.
+    frames: Option<Buffer>,
     /// The result, before it is copied to memory that the host reads.
     output: Option<Buffer>,
 }
@@ -138,7 +155,11 @@ impl ResidentMotions {
             cast_slice(source.cells),
             cast_slice(source.links),
         ];
-        let bytes = tables.iter().map(|table| table.len() as u64).sum();
+        let of_tree: [&[u8]; 2] = source.tree.as_ref().map_or([&[]; 2], |tree| {
+            [cast_slice(tree.frames), cast_slice(tree.picks)]
+        });
+        let all = tables.iter().chain(&of_tree);
+        let bytes = all.map(|table| table.len() as u64).sum();
         let (subject, limit) = (SUBJECT, engine.device.physical.info.device_local_memory);
         if bytes > limit {
             return Err(VulkanError::TooLarge {
@@ -161,6 +182,15 @@ impl ResidentMotions {
             engine.check_size(SUBJECT, bytes)?;
             engine.resident("tumble motion library", bytes, &mut Vec::new())
         };
+        let tree = |tree: &TreeSource<'_>| {
+            let [frames, picks] = of_tree.map(table);
+            Ok::<_, VulkanError>(ResidentTree {
+                frames: frames?,
+                picks: picks?,
+                frame_count: tree.frames.len() as u32,
+            })
+        };
+        let tree = source.tree.as_ref().map(tree).transpose()?;
         let [clips, bases, spans, channels, cells, links] = tables.map(table);
         Ok(Self {
             work: Exclusive::default(),
@@ -170,6 +200,7 @@ impl ResidentMotions {
             channels: channels?,
             cells: cells?,
             links: links?,
+            tree,
             bytes,
             joints: source.joints,
             link_count: source.links.len() as u32,
@@ -183,15 +214,14 @@ impl ResidentMotions {
         self.bytes
     }
 
+    /// Joints of the skeleton, or tracks of a robot.
+    pub(crate) fn joints(&self) -> u32 {
+        self.joints
+    }
+
     /// The name of the device.
     pub(crate) fn device_name(&self) -> &str {
         &self.engine.device.physical.info.name
-    }
-
-    /// The ranges of arrays in a result.
-    fn ranges(&self, request: &StatesRequest<'_>) -> Vec<Range<u64>> {
-        let joints = request.at.len() * self.joints as usize;
-        StateArray::ranges(request.arrays, request.rotations, joints)
     }
 
     /// Computes states into memory that other interfaces on the same card import, and the ranges of the arrays. If they
@@ -201,7 +231,7 @@ impl ResidentMotions {
         request: &StatesRequest<'_>,
     ) -> Result<(ExportedResult, Vec<Range<u64>>), EvaluateError> {
         self.engine.device.check_process()?;
-        let ranges = self.ranges(request);
+        let ranges = StoredArray::ranges(request.arrays, request.at.len());
         let bytes = ranges.last().map_or(0, |range| range.end);
         let exported = self.engine.exported(bytes)?;
         self.run(request, &ranges, StatesTarget::Exported(&exported))?;
@@ -214,7 +244,7 @@ impl ResidentMotions {
         request: &StatesRequest<'_>,
     ) -> Result<(MappedStates, Vec<Range<u64>>), EvaluateError> {
         self.engine.device.check_process()?;
-        let ranges = self.ranges(request);
+        let ranges = StoredArray::ranges(request.arrays, request.at.len());
         let bytes = ranges.last().map_or(0, |range| range.end);
         let is_in_place = self.engine.device.placing.in_place;
         let residence = match is_in_place {
@@ -240,7 +270,8 @@ impl ResidentMotions {
             DeviceKind::Cpu => SOFTWARE_WINDOW,
             _ => WINDOW,
         };
-        let each = shape.state_bytes();
+        let [of_joints, of_frames] = shape.state_bytes();
+        let each = of_joints.max(of_frames);
         physical.check_range("the states of a motion library", LEAST_WINDOW * each)?;
         let window = limit.min(largest) / each / LEAST_WINDOW * LEAST_WINDOW;
         Ok(window.max(LEAST_WINDOW) as usize)
@@ -264,6 +295,7 @@ impl ResidentMotions {
                 samples: Upload::default(),
                 rates: Upload::default(),
                 states: None,
+                frames: None,
                 output: None,
             }),
         };
@@ -285,9 +317,9 @@ impl ResidentMotions {
         let shape = StatesShape {
             joints: self.joints,
             links: self.link_count,
+            frames: self.tree.as_ref().map_or(0, |tree| tree.frame_count),
             ticks_per_second: self.ticks_per_second,
             arrays: request.arrays,
-            rotations: request.rotations,
             are_differences: request.steps.is_some(),
             instances: request.at.len(),
         };
@@ -296,8 +328,11 @@ impl ResidentMotions {
         let bytes = ranges.last().map_or(0, |range| range.end);
         self.upload(work, request, window)?;
         let device = &self.engine.device;
-        let states = window.min(count) as u64 * shape.state_bytes();
-        grow(device, &mut work.states, states, Residence::Device)?;
+        let states = (shape.state_bytes()).map(|each| window.min(count) as u64 * each);
+        grow(device, &mut work.states, states[0], Residence::Device)?;
+        if self.tree.is_some() {
+            grow(device, &mut work.frames, states[1], Residence::Device)?;
+        }
         if matches!(target, StatesTarget::Copied(_)) {
             grow(device, &mut work.output, bytes, Residence::Results)?;
         }
@@ -368,6 +403,7 @@ impl ResidentMotions {
             samples,
             rates,
             states,
+            frames,
             output,
         } = work;
         submission.begin()?;
@@ -399,6 +435,14 @@ impl ResidentMotions {
             samples,
             rates,
             states: recorded.whole(states),
+            tree: match (&self.tree, frames) {
+                (Some(tree), Some(states)) => Some(TreeResources {
+                    frames: recorded.whole(&tree.frames),
+                    picks: recorded.whole(&tree.picks),
+                    states: recorded.whole(states),
+                }),
+                _ => None,
+            },
             result,
         };
         let instances = window.start as u32..window.end as u32;

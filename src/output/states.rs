@@ -1,11 +1,15 @@
-//! The arrays of states of a motion library's clips.
+//! The arrays of states of a motion library's clips, and of a robot's.
 
 use std::ops::Range;
 
 use crate::names::names;
 use crate::output::encoding::Encoding;
 use crate::output::pose_error::OFFSET_STEP;
-use crate::shader::{ANGULAR_VELOCITY, LOCAL_ROTATION, POSITION, VELOCITY, WORLD_ROTATION};
+use crate::pose::tree::TreeFrames;
+use crate::shader::{
+    ANGULAR_VELOCITY, LOCAL_ROTATION, POSITION, STATE_VECTORS, VECTOR_WORDS, VELOCITY,
+    WORLD_ROTATION,
+};
 
 /// An array of [`MotionStates`](crate::crowd::MotionStates).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -53,13 +57,149 @@ impl StateArray {
         }
     }
 
-    /// The ranges in bytes of arrays in a result, for so many joints of instances. Each starts where a kernel can bind
-    /// it.
-    pub(crate) fn ranges(arrays: &[Self], rotations: Encoding, joints: usize) -> Vec<Range<u64>> {
+    /// What a kernel stores of an instance, for so many joints, if the encoding of rotations is `rotations`.
+    pub(crate) fn stored(self, joints: u32, rotations: Encoding) -> StoredArray {
+        let encoding = self.encoding(rotations);
+        StoredArray {
+            numbers: joints * encoding.components().len() as u32,
+            from: StoredNumbers::OfJoints {
+                vector: self.vector(),
+                encoding,
+            },
+            needs_walk: self != Self::Rotations,
+            needs_velocities: matches!(self, Self::Velocities | Self::AngularVelocities),
+        }
+    }
+}
+
+/// An array of [`BodyStates`](crate::crowd::BodyStates).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum BodyArray {
+    /// Values of hinges and slides.
+    JointValues,
+    /// Their velocities.
+    JointRates,
+    /// Positions of bodies in the world.
+    Positions,
+    /// Rotations in the world, in the order that the frames have.
+    Rotations,
+    /// Velocities in the world.
+    Velocities,
+    /// Angular velocities about the world's axes.
+    AngularVelocities,
+}
+
+names! {
+    BodyArray, "array",
+    JointValues => "joint_pos",
+    JointRates => "joint_vel",
+    Positions => "body_pos_w",
+    Rotations => "body_quat_w",
+    Velocities => "body_lin_vel_w",
+    AngularVelocities => "body_ang_vel_w",
+}
+
+impl BodyArray {
+    /// The number of f32 numbers of a joint or body.
+    #[must_use]
+    pub fn numbers(self) -> usize {
+        match self {
+            Self::JointValues | Self::JointRates => 1,
+            Self::Rotations => 4,
+            Self::Positions | Self::Velocities | Self::AngularVelocities => 3,
+        }
+    }
+
+    /// Whether it has the numbers of joints, not those of bodies.
+    #[must_use]
+    pub fn is_of_joints(self) -> bool {
+        matches!(self, Self::JointValues | Self::JointRates)
+    }
+
+    /// The words of an instance's states that it has.
+    fn picks(self, frames: &TreeFrames) -> Vec<u32> {
+        let state = STATE_VECTORS * VECTOR_WORDS;
+        let vectors = |list: &[u32], vector: u32, components: &[u32]| {
+            let of = |frame: &u32| {
+                let first = frame * state + vector * VECTOR_WORDS;
+                components.iter().map(move |component| first + component)
+            };
+            list.iter().flat_map(of).collect()
+        };
+        match self {
+            Self::JointValues => frames.scalars.clone(),
+            Self::JointRates => {
+                let to_rate = (VELOCITY - POSITION) * VECTOR_WORDS;
+                frames.scalars.iter().map(|word| word + to_rate).collect()
+            }
+            Self::Positions => vectors(&frames.bodies, POSITION, &[0, 1, 2]),
+            Self::Rotations if frames.is_w_first => {
+                vectors(&frames.bodies, WORLD_ROTATION, &[3, 0, 1, 2])
+            }
+            Self::Rotations => vectors(&frames.bodies, WORLD_ROTATION, &[0, 1, 2, 3]),
+            Self::Velocities => vectors(&frames.points, VELOCITY, &[0, 1, 2]),
+            Self::AngularVelocities => vectors(&frames.bodies, ANGULAR_VELOCITY, &[0, 1, 2]),
+        }
+    }
+
+    /// The words of all arrays, one array after the other.
+    pub(crate) fn all_picks(frames: &TreeFrames) -> Vec<u32> {
+        Self::ALL.iter().flat_map(|it| it.picks(frames)).collect()
+    }
+
+    /// What a kernel stores of an instance; its words are among [`BodyArray::all_picks`].
+    pub(crate) fn stored(self, frames: &TreeFrames) -> StoredArray {
+        let count = |array: Self| {
+            let each = match array.is_of_joints() {
+                true => frames.scalars.len(),
+                false => frames.bodies.len(),
+            };
+            (each * array.numbers()) as u32
+        };
+        let before = Self::ALL.iter().take_while(|&&array| array != self);
+        StoredArray {
+            numbers: count(self),
+            from: StoredNumbers::Picked {
+                first: before.map(|&array| count(array)).sum(),
+                of_frames: !self.is_of_joints(),
+            },
+            needs_walk: !self.is_of_joints(),
+            needs_velocities: matches!(
+                self,
+                Self::JointRates | Self::Velocities | Self::AngularVelocities
+            ),
+        }
+    }
+}
+
+/// An array of a result, as kernels store it.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct StoredArray {
+    /// The f32 numbers of an instance.
+    pub(crate) numbers: u32,
+    pub(crate) from: StoredNumbers,
+    /// Whether it has values in the world.
+    pub(crate) needs_walk: bool,
+    pub(crate) needs_velocities: bool,
+}
+
+/// Where an array's numbers are in the states.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum StoredNumbers {
+    /// A vector of each joint, in an encoding of f32 numbers.
+    OfJoints { vector: u32, encoding: Encoding },
+    /// Words of a list, from `first` on, in the states of frames or else of tracks.
+    Picked { first: u32, of_frames: bool },
+}
+
+impl StoredArray {
+    /// The ranges in bytes of arrays in a result of so many instances. Each starts where a kernel can bind it.
+    pub(crate) fn ranges(arrays: &[Self], instances: usize) -> Vec<Range<u64>> {
         let mut end = 0u64;
         let range = |array: &Self| {
             let start = end.next_multiple_of(OFFSET_STEP);
-            end = start + joints as u64 * array.encoding(rotations).bytes() as u64;
+            end = start + 4 * instances as u64 * u64::from(array.numbers);
             start..end
         };
         arrays.iter().map(range).collect()

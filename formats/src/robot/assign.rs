@@ -82,6 +82,21 @@ impl Robot {
         Ok(())
     }
 
+    /// A clip whose root and scalars have the names of this robot's joints, as of [`Robot::assign`], and the warnings. `name`
+    /// is the clip's name in messages.
+    ///
+    /// # Errors
+    /// When the clip does not have the joints of this robot (`E904`), or the bodies contradict the order (`E907`).
+    pub fn assign_clip(
+        &self,
+        clip: &Motion,
+        name: &str,
+    ) -> Result<(Motion, Vec<Diagnostic>), Diagnostic> {
+        let mut warnings = Warnings::new(name);
+        let clip = self.assigned(clip, name, None, &mut warnings)?;
+        Ok((clip, warnings.into_list()))
+    }
+
     fn assigned(
         &self,
         clip: &Motion,

@@ -6,6 +6,7 @@
 
 mod assign;
 mod bodies;
+mod library;
 mod mjcf;
 mod urdf;
 mod xml;
@@ -20,6 +21,7 @@ pub use bodies::{
     Bodies, BodiesError, BodiesRequest, LimitExcess, LimitRule, VelocityPoint, VelocitySource,
     bodies, clamp_scalars, mass_centres, motions, scalar_excesses, unwrap_angles, unwrap_joint,
 };
+pub use library::{LARGEST_ANGLE, RobotClipError, RobotTracks};
 
 use crate::diagnostic::{Code, Diagnostic};
 use crate::limits::Limits;

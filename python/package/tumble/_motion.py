@@ -27,6 +27,7 @@ from tumble._tumble import (
     Engine,
     File,
     Motions,
+    Robot,
     joint_partners,
     load,
     load_all,
@@ -34,6 +35,8 @@ from tumble._tumble import (
     put_w_first,
     reframe,
     represent,
+    robot_motions,
+    sample_bodies,
     scalar_motions,
     shaped,
 )
@@ -46,7 +49,10 @@ if TYPE_CHECKING:
         "rotations", "positions", "world_rotations", "velocities", "angular_velocities"
     ]
     _ScalarName: TypeAlias = Literal["dofs", "dof_velocities", "contacts"]
-    _Name: TypeAlias = _JointName | _ScalarName
+    _BodyName: TypeAlias = Literal[
+        "joint_pos", "joint_vel", "body_pos_w", "body_quat_w", "body_lin_vel_w", "body_ang_vel_w"
+    ]
+    _Name: TypeAlias = _JointName | _ScalarName | _BodyName
     from typing_extensions import TypeVar as _TypeVar
 
     # The type of the arrays in results: NumPy's, or that of a library whose arrays are on a device.
@@ -63,7 +69,16 @@ _NAMES: tuple[_JointName, ...] = (
 )
 # The arrays of scalars.
 _SCALARS: tuple[_ScalarName, ...] = ("dofs", "dof_velocities", "contacts")
-_ALL: tuple[_Name, ...] = (*_NAMES, *_SCALARS)
+# The arrays of a robot, as those of `Engine.bodies`.
+_BODIES: tuple[_BodyName, ...] = (
+    "joint_pos",
+    "joint_vel",
+    "body_pos_w",
+    "body_quat_w",
+    "body_lin_vel_w",
+    "body_ang_vel_w",
+)
+_ALL: tuple[_Name, ...] = (*_NAMES, *_SCALARS, *_BODIES)
 # The shape of a rotation in each representation.
 _SHAPES: dict[str, tuple[int, ...]] = {"quaternion": (4,), "matrix": (3, 3), "6d": (6,), "rotvec": (3,)}
 # Arrays in a file start at a multiple of this [bytes]: the alignment of every processor, and a cache line.
@@ -93,6 +108,12 @@ class MotionState(_WithWeakReferences[_A]):
     dof_velocities: (…, dofs), their derivatives.
     contacts: (…, contacts), the scalars that are contacts (`MotionLibrary.contact_names`), 0 or 1.
 
+    Of a library with `robot`, the arrays of `Engine.bodies` instead:
+
+    joint_pos, joint_vel: (…, joints), the values of hinges and slides, and their derivatives.
+    body_pos_w, body_lin_vel_w, body_ang_vel_w: (…, bodies, 3), in the world, about its axes.
+    body_quat_w: (…, bodies, 4), in the order of the library.
+
     Arrays of a library on a device are `DeviceArray`s.
 
     >>> import tumble
@@ -108,6 +129,12 @@ class MotionState(_WithWeakReferences[_A]):
     dofs: _A | None = None
     dof_velocities: _A | None = None
     contacts: _A | None = None
+    joint_pos: _A | None = None
+    joint_vel: _A | None = None
+    body_pos_w: _A | None = None
+    body_quat_w: _A | None = None
+    body_lin_vel_w: _A | None = None
+    body_ang_vel_w: _A | None = None
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, MotionState):
@@ -131,9 +158,22 @@ if TYPE_CHECKING:
     _Ground: TypeAlias = Literal["y", "z"]
     _Axis: TypeAlias = Literal["x", "y", "z"]
     _Order: TypeAlias = Literal["xyzw", "wxyz"]
+    _BodyOrder: TypeAlias = Literal["depth-first", "breadth-first"]
+    _Siblings: TypeAlias = Literal["file", "body-name", "joint-name"]
+    _VelocityAt: TypeAlias = Literal["origin", "mass"]
     _Progress: TypeAlias = Callable[[int, int], object] | Any
 
-    class _Whole(MotionState[_A]):
+    class _OfRobot(MotionState[_A]):
+        """A state that may be that of a robot."""
+
+        joint_pos: Any
+        joint_vel: Any
+        body_pos_w: Any
+        body_quat_w: Any
+        body_lin_vel_w: Any
+        body_ang_vel_w: Any
+
+    class _Whole(_OfRobot[_A]):
         """A state of which no array of joints was left out."""
 
         rotations: _A
@@ -142,7 +182,7 @@ if TYPE_CHECKING:
         velocities: _A
         angular_velocities: _A
 
-    class _Some(MotionState[_A]):
+    class _Some(_OfRobot[_A]):
         """A state with the arrays that were asked for; which, types do not say."""
 
         rotations: Any
@@ -268,6 +308,13 @@ class MotionLibrary(Generic[_A]):
     Scalars that all clips have, such as the angles of a robot's joints, are sampled, too: `dof_names`, and `contact_names`
     for those that are contacts, which are steps. The other scalars are interpolated by `method`, lines for slerp.
 
+    `robot`: the `Robot` that moves. The clips then need no skeleton: their scalars are its joints, and their tracks its root
+    and its balls, matched by name; a track called `root`, too, is the root. Joints that the robot does not have are refused,
+    and those that a clip does not have rest, which a warning says. `sample` has the arrays of `Engine.bodies`:
+    `joint_pos`, `joint_vel`, `body_pos_w`, `body_quat_w`, `body_lin_vel_w`, `body_ang_vel_w`. `order` is that of
+    `body_quat_w`, "wxyz" or "xyzw"; there is no default, because programs differ. `body_order`, `siblings` and
+    `velocity_at`: as of `Engine.bodies`. Bodies are computed in float32, with the same bits on every device.
+
     `paths`: the path of the file of each clip; empty for a clip that was not read from one.
 
     Times count from the first key of a clip, and are kept to at least 0.5 µs (30 ns for clips of up to two minutes);
@@ -303,6 +350,11 @@ class MotionLibrary(Generic[_A]):
         engine: Engine | None = ...,
         on_error: _OnError = ...,
         packed: bool = ...,
+        robot: Robot | None = ...,
+        order: _Order | None = ...,
+        body_order: _BodyOrder | None = ...,
+        siblings: _Siblings | None = ...,
+        velocity_at: _VelocityAt | None = ...,
         device: Literal["cpu"] | None = ...,
     ) -> None: ...
 
@@ -317,6 +369,11 @@ class MotionLibrary(Generic[_A]):
         engine: Engine | None = ...,
         on_error: _OnError = ...,
         packed: bool = ...,
+        robot: Robot | None = ...,
+        order: _Order | None = ...,
+        body_order: _BodyOrder | None = ...,
+        siblings: _Siblings | None = ...,
+        velocity_at: _VelocityAt | None = ...,
         device: _Device,
     ) -> None: ...
 
@@ -330,6 +387,11 @@ class MotionLibrary(Generic[_A]):
         engine: Engine | None = None,
         on_error: _OnError = "refuse",
         packed: bool = False,
+        robot: Robot | None = None,
+        order: _Order | None = None,
+        body_order: _BodyOrder | None = None,
+        siblings: _Siblings | None = None,
+        velocity_at: _VelocityAt | None = None,
         device: _Device | None = None,
     ) -> None:
         clips = list(clips)
@@ -339,7 +401,29 @@ class MotionLibrary(Generic[_A]):
         if names is not None and len(names) != len(clips):
             raise InputError(f"names: there are {len(names)} for {len(clips)} clips")
         all_names = list(names) if names is not None else [_name(clip) for clip in clips]
-        self._motions = Motions.of_clips(clips, _skeleton_of(skeleton), method, skip, packed)
+        of_robot = {"order": order, "body_order": body_order, "siblings": siblings, "velocity_at": velocity_at}
+        if robot is None:
+            if named := [name for name, value in of_robot.items() if value is not None]:
+                raise InputError(f"{', '.join(named)}: of a robot's bodies; give `robot`, too")
+            self._motions = Motions.of_clips(clips, _skeleton_of(skeleton), method, skip, packed)
+        else:
+            if skeleton is not None:
+                raise InputError("skeleton and robot: the robot has the bodies; give one of the two")
+            if order is None:
+                raise InputError(
+                    'order: give "wxyz" or "xyzw", the order of body_quat_w; there is no default, because programs differ'
+                )
+            self._motions = robot_motions(
+                clips,
+                robot,
+                method,
+                order=order,
+                body_order=body_order or "depth-first",
+                siblings=siblings or "file",
+                velocity_at=velocity_at or "origin",
+                skip=skip,
+                packed=packed,
+            )
         left_out = dict(self._motions.skipped)
         self.skipped = [
             Skipped(os.fspath(clips[index].path or ""), all_names[index], None, message)
@@ -359,6 +443,8 @@ class MotionLibrary(Generic[_A]):
         used = [clips[index] for index in kept]
         self._scalars = {
             kind: _Scalars(*scalar_motions(used, method, ticks, contacts=kind == "contacts"))
+            if robot is None
+            else _Scalars(None, [], [], "it has a robot, whose joints are in joint_pos and joint_vel")
             for kind in ("dofs", "contacts")
         }
         self._file: str | None = None
@@ -384,6 +470,11 @@ class MotionLibrary(Generic[_A]):
         collapse: bool = ...,
         progress: _Progress | None = ...,
         shard: tuple[int, int] | None = ...,
+        robot: Robot | None = ...,
+        order: _Order | None = ...,
+        body_order: _BodyOrder | None = ...,
+        siblings: _Siblings | None = ...,
+        velocity_at: _VelocityAt | None = ...,
         device: Literal["cpu"] | None = ...,
         **options: Any,
     ) -> MotionLibrary[_Array]: ...
@@ -404,6 +495,11 @@ class MotionLibrary(Generic[_A]):
         collapse: bool = ...,
         progress: _Progress | None = ...,
         shard: tuple[int, int] | None = ...,
+        robot: Robot | None = ...,
+        order: _Order | None = ...,
+        body_order: _BodyOrder | None = ...,
+        siblings: _Siblings | None = ...,
+        velocity_at: _VelocityAt | None = ...,
         device: _Device,
         **options: Any,
     ) -> MotionLibrary[DeviceArray]: ...
@@ -423,6 +519,11 @@ class MotionLibrary(Generic[_A]):
         collapse: bool = False,
         progress: _Progress | None = None,
         shard: tuple[int, int] | None = None,
+        robot: Robot | None = None,
+        order: _Order | None = None,
+        body_order: _BodyOrder | None = None,
+        siblings: _Siblings | None = None,
+        velocity_at: _VelocityAt | None = None,
         device: _Device | None = None,
         **options: Any,
     ) -> MotionLibrary[Any]:
@@ -442,7 +543,8 @@ class MotionLibrary(Generic[_A]):
         names. With `collapse`, it has all joints of the file. `on_error`: "refuse" ends at the first file that cannot be
         read; "skip" leaves out such files, and clips that do not fit the skeleton, and lists them in `skipped`. Files of AMASS without a motion
         (`shape.npz`, `*_stagei.npz`) are left out, too. `progress`: a bar such as `tqdm.tqdm` or an instance of it, or a
-        function, which is called with the number of files read so far and of all. `packed`, `device`: as of the class.
+        function, which is called with the number of files read so far and of all. `packed`, `device`, and `robot` with what
+        belongs to it: as of the class.
 
         >>> import tempfile, os, tumble
         >>> folder = tempfile.mkdtemp()
@@ -498,13 +600,20 @@ class MotionLibrary(Generic[_A]):
                 raise InputError(f"shard: none of the {len(paths)} files is for process {rank} of {processes}")
         # The joints have the order of the first clip of all files, whichever process it belongs to.
         before: list[tuple[int, Clip]] = []
-        if skeleton is None:
+        if skeleton is None and robot is None:
             for index in range(clips[0][0] if clips else 0):
                 if index % processes != rank and not before:
                     before = read([index])[0]
         if skeleton is not None and not isinstance(skeleton, tuple):
             skeleton = shaped(_clip_of(skeleton), tracks=tracks, collapse=collapse, method=method)
         every = before + clips
+        of_robot: dict[str, Any] = {
+            "robot": robot,
+            "order": order,
+            "body_order": body_order,
+            "siblings": siblings,
+            "velocity_at": velocity_at,
+        }
         made: MotionLibrary[Any] = cls(
             [clip for _, clip in every],
             method=method,
@@ -513,6 +622,7 @@ class MotionLibrary(Generic[_A]):
             on_error=on_error,
             packed=packed,
             device=device,
+            **of_robot,
         )
         file_of = np.array([index for index, _ in every], np.int64)
         del before, clips, every
@@ -591,6 +701,8 @@ class MotionLibrary(Generic[_A]):
             raise InputError(f"axis: there is no `{axis}`; there are {', '.join(axes)}")
         if self._device is not None:
             raise InputError("with_mirrored: mirror images are computed on the CPU; use a library without `device`")
+        if self._bodies:
+            raise InputError("with_mirrored: the library has a robot; mirror its clips with `Clip.mirrored`, and make a library of both")
         if self._mirrored is not None:
             raise InputError("with_mirrored: the library has mirror images already")
         if self.dof_names:
@@ -766,7 +878,7 @@ class MotionLibrary(Generic[_A]):
         *,
         arrays: Sequence[_Name] | None = None,
         finite: bool = False,
-        order: _Order = "xyzw",
+        order: _Order | None = None,
         rotations: _Representation = "quaternion",
         heading: _Heading | None = None,
         up: _Ground | None = None,
@@ -780,9 +892,10 @@ class MotionLibrary(Generic[_A]):
 
         `arrays`: the names of those to compute, by default all; fewer arrays take less time. `out`: a state; the arrays
         that it has are filled again. `finite`: velocities as differences of the two frames of the clip's rate around a
-        time, as other motion libraries have them, instead of the exact derivatives. `order`: of quaternions. `rotations`:
-        how both arrays of rotations are stored: "quaternion" (…, 4), "matrix" (…, 3, 3) for column vectors, "6d" (…, 6),
-        the first two columns of the matrix (`six-columns` of docs/features.md), or "rotvec" (…, 3), axis times angle.
+        time, as other motion libraries have them, instead of the exact derivatives. `order`: of quaternions, by
+        default "xyzw"; that of a library with `robot` was stated when it was made. `rotations`: how both arrays of
+        rotations are stored: "quaternion" (…, 4), "matrix" (…, 3, 3) for column vectors, "6d" (…, 6), the first two
+        columns of the matrix (`six-columns` of docs/features.md), or "rotvec" (…, 3), axis times angle.
 
         `heading`: states in the heading frame of the root, the first joint without a parent, instead of the world. The frame
         is on the ground below the root, and has its heading: "twist", or that of its axis "x", "y" or "z", as
@@ -839,25 +952,36 @@ class MotionLibrary(Generic[_A]):
         listed = np.ascontiguousarray(np.broadcast_to(ids, shape), np.int64).reshape(-1)
         ids = self._ids(listed)
         moments = np.ascontiguousarray(np.broadcast_to(moments, shape)).reshape(-1)
-        each = {name: (self._motions.joints, *of) for name, of in _shapes_of(order, rotations).items()}
-        each |= {name: (len(self._scalars[_kind(name)].names),) for name in _SCALARS}
+        if self._bodies:
+            each: dict[str, tuple[int, ...]] = {name: (self.joints,) for name in _BODIES if name.startswith("joint")}
+            each |= {
+                name: (self._bodies, 4 if name == "body_quat_w" else 3) for name in _BODIES if name.startswith("body")
+            }
+            if order is not None or rotations != "quaternion" or heading is not None:
+                raise InputError(
+                    "order, rotations and heading: a library with `robot` has bodies in the world, and body_quat_w has quaternions"
+                    " in the order that was given to the library; leave them out"
+                )
+        else:
+            order = "xyzw" if order is None else order
+            each = {name: (self._motions.joints, *of) for name, of in _shapes_of(order, rotations).items()}
+            each |= {name: (len(self._scalars[_kind(name)].names),) for name in _SCALARS}
         if isinstance(arrays, str):
             raise TypeError(f'arrays: {arrays!r} is one name; give a list, such as ["{arrays}"]')
         for name in arrays if arrays is not None else ():
-            if name not in _ALL:
-                raise InputError(f"arrays: there is no `{name}`; there are {', '.join(_ALL)}")
-            if name in _SCALARS:
-                self._check_scalars(name)
+            self._check_name(name)
+        every: tuple[str, ...] = _BODIES if self._bodies else _NAMES
         if self._device is not None:
-            if out is not None or order != "xyzw" or rotations == "rotvec" or heading is not None:
+            if out is not None or order not in (None, "xyzw") or rotations == "rotvec" or heading is not None:
                 raise InputError(
                     "out, order, heading and rotvec: a library on a device makes new arrays in the world, of quaternions"
                     " x y z w, matrices or 6d; leave them out, and convert on the device, or use a library without `device`"
                 )
-            names = _NAMES if arrays is None else tuple(arrays)
+            names = every if arrays is None else tuple(arrays)
             return self._sampled_on_device(ids, moments, shape, names, rotations, finite)
         if out is None:
-            every = (*_NAMES, *(name for name in _SCALARS if self._scalars[_kind(name)].names))
+            if not self._bodies:
+                every = (*every, *(name for name in _SCALARS if self._scalars[_kind(name)].names))
             asked = every if arrays is None else arrays
             out = MotionState(**{name: _aligned((*shape, *each[name])) for name in asked})
         elif not isinstance(out, MotionState):
@@ -865,11 +989,14 @@ class MotionLibrary(Generic[_A]):
         elif arrays is not None:
             raise InputError("arrays and out: the arrays of `out` are those that are filled; give one of the two")
         else:
-            for name in _SCALARS:
+            for name in _ALL:
                 if getattr(out, name) is not None:
-                    self._check_scalars(name)
+                    self._check_name(name)
             _check_out(out, shape, each)
         filled = _flat(out, len(shape))
+        if self._bodies:
+            self._fill_bodies(ids, moments, finite, filled)
+            return out
         # Quaternions that the result does not have, or has in another representation.
         quaternions = {
             name: _aligned((ids.size, self._motions.joints, 4))
@@ -909,14 +1036,31 @@ class MotionLibrary(Generic[_A]):
             arrays = (state.rotations, state.positions, state.world_rotations, state.velocities, state.angular_velocities)
             reframe(arrays, self._motions.joints, mirror, heading)
 
-    def _check_scalars(self, name: str) -> None:
-        """Refuses arrays of scalars that a library does not have."""
+    def _check_name(self, name: str) -> None:
+        """Refuses arrays that a library does not have."""
+        if name not in _ALL:
+            raise InputError(f"arrays: there is no `{name}`; there are {', '.join(_BODIES if self._bodies else _ALL)}")
+        if name in _BODIES and not self._bodies:
+            raise InputError(f"arrays: {name} is of a robot; make the library with `robot`")
+        if self._bodies and name not in _BODIES:
+            raise InputError(f"arrays: the library has a robot, and no {name}; there are {', '.join(_BODIES)}")
+        if name not in _SCALARS:
+            return
         kind = _kind(name)
         if self._device is not None:
             raise InputError(f"arrays: {name} are sampled on the CPU; use a library without `device` for them")
         if not self._scalars[kind].names:
             reason = self._scalars[kind].reason
             raise InputError(f"arrays: the library has no {name}" + (f": {reason}" if reason else ""))
+
+    def _fill_bodies(
+        self, ids: NDArray[np.int64], moments: NDArray[np.float64], finite: bool, out: MotionState
+    ) -> None:
+        """Fills the arrays of a robot, (N, …)."""
+        arrays = [getattr(out, name) for name in _BODIES]
+        moves = any(array is not None for name, array in zip(_BODIES, arrays) if _is_velocity(name))
+        columns = [None if array is None else array.reshape(*array.shape, 1) if array.ndim == 2 else array for array in arrays]
+        sample_bodies(self._motions, self._engine, ids, moments, columns, self._frames(ids) if finite and moves else None)
 
     def _fill_scalars(
         self, ids: NDArray[np.int64], moments: NDArray[np.float64], finite: bool, out: MotionState
@@ -957,7 +1101,7 @@ class MotionLibrary(Generic[_A]):
         finite: bool,
     ) -> MotionState[DeviceArray]:
         """The arrays with these names, in memory of the device."""
-        frames = self._frames(ids) if finite and any(name.endswith("velocities") for name in names) else None
+        frames = self._frames(ids) if finite and any(_is_velocity(name) for name in names) else None
         names = list(dict.fromkeys(names))
         found = self._on_device.sample(ids, moments, shape, names, rotations, frames)
         return MotionState(**dict(zip(names, found, strict=True)))
@@ -1126,7 +1270,7 @@ class MotionLibrary(Generic[_A]):
         *,
         arrays: Sequence[_Name] | None = None,
         finite: bool = False,
-        order: _Order = "xyzw",
+        order: _Order | None = None,
         rotations: _Representation = "quaternion",
         heading: _Heading | None = None,
         up: _Ground | None = None,
@@ -1335,6 +1479,8 @@ class MotionLibrary(Generic[_A]):
         if only is not None and unplaced:
             unplaced = [unplaced[index] for index in only]
         about["unplaced"] = np.array(unplaced, dtype=np.str_)
+        if self._bodies:
+            about["body_names"] = np.array(self.body_names, dtype=np.str_)
         for kind, scalars in self._scalars.items():
             about |= scalars.arrays(kind, only)
         return {**about, **self._motions.arrays(only)}
@@ -1351,13 +1497,22 @@ class MotionLibrary(Generic[_A]):
 
     @property
     def joints(self) -> int:
-        """Joints of the skeleton."""
-        return self._motions.joints
+        """Joints of the skeleton, or the hinges and slides of the robot."""
+        return len(self.joint_names) if self._bodies else self._motions.joints
 
     @property
     def joint_names(self) -> list[str]:
-        """The names of the joints, in the order of all arrays: those of the skeleton."""
+        """The names of the joints, in the order of all arrays: those of the skeleton, or of the robot's `joint_pos`."""
         return self._motions.joint_names
+
+    @property
+    def body_names(self) -> list[str]:
+        """The names of the robot's bodies, in the order of all arrays; empty without a robot."""
+        return self._motions.body_names
+
+    @property
+    def _bodies(self) -> int:
+        return len(self._motions.body_names)
 
     @property
     def dof_names(self) -> list[str]:
@@ -1434,6 +1589,10 @@ def _shapes_of(order: str, rotations: str) -> dict[str, tuple[int, ...]]:
     return {name: _SHAPES[rotations] if name.endswith("rotations") else (3,) for name in _NAMES}
 
 
+def _is_velocity(name: str) -> bool:
+    return name.endswith("velocities") or "_vel" in name and not name.startswith("dof")
+
+
 def _kind(name: str) -> str:
     """The scalars of an array."""
     return "contacts" if name == "contacts" else "dofs"
@@ -1443,9 +1602,9 @@ def _check_out(out: MotionState, shape: tuple[int, ...], each: dict[str, tuple[i
     """Refuses arrays of another shape, type or order in memory than results have."""
     for name in _ALL:
         array = getattr(out, name)
-        expected = (*shape, *each[name])
         if array is None:
             continue
+        expected = (*shape, *each[name])
         if not isinstance(array, np.ndarray):
             raise InputError(f"out: its {name} are of the type {type(array).__name__}; give an array of NumPy")
         if array.dtype != np.float32 or array.shape != expected:

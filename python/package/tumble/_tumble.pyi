@@ -1386,6 +1386,26 @@ def shaped(
 def scalar_motions(
     clips: Sequence[Clip], method: str, ticks_per_second: int, *, contacts: bool
 ) -> tuple[Motions | None, list[str], list[int], str | None]: ...
+def robot_motions(
+    clips: Sequence[Clip],
+    robot: Robot,
+    method: str,
+    *,
+    order: str,
+    body_order: str,
+    siblings: str,
+    velocity_at: str,
+    skip: bool = False,
+    packed: bool = False,
+) -> Motions: ...
+def sample_bodies(
+    motions: Motions,
+    engine: Engine,
+    clip_ids: NDArray[np.int64],
+    times: NDArray[np.float64],
+    outputs: Sequence[_Single | None],
+    frames: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None,
+) -> None: ...
 def put_w_first(quaternions: _Single) -> None: ...
 def represent(engine: Engine, rotations: _Single, kind: str, out: _Single) -> None: ...
 def joint_partners(
@@ -1424,6 +1444,7 @@ class Motions:
     def joint_names(self) -> list[str]: ...
     @property
     def parents(self) -> list[int | None]: ...
+    def body_names(self) -> list[str]: ...
     @property
     def unplaced(self) -> list[str]: ...
     @property

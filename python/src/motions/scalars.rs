@@ -1,27 +1,27 @@
-//! The scalars of a library's clips, such as the angles of a robot's joints: tables of bodies without parents that do not
-//! rotate. Up to three scalars are the coordinates of a body, so that they are sampled as positions are, and their rates as
-//! velocities.
+//! The scalars of a library's clips, such as the angles of a robot's joints: tables of tracks without parents that do not
+//! rotate, of which up to three scalars are the positions.
 
 use std::borrow::Cow;
 
-use glam::{Quat, Vec3};
+use glam::Vec3;
 use pyo3::prelude::*;
 use tumble::crowd::{KeyPrecision, MotionClip};
-use tumble::{ScalarKeys, Skeleton, TrackError, TrackSet, VectorMethod, method};
+use tumble::{Skeleton, TrackSet, VectorMethod, method};
+use tumble_formats::motion::scalar_tracks::{ScalarTracks, scalar_of};
 use tumble_formats::motion::{ChannelInterpolation, Motion, ScalarKind};
 use tumble_formats::sample::MethodChoice;
 
 use crate::arrays::ListArgument;
 use crate::clip::Clip;
 use crate::errors::{input, of_track};
-use crate::motions::{ListedClip, Motions, built};
+use crate::motions::{ListedClip, Motions, Tables, built};
 use crate::options::method_named;
 use crate::run::stoppable;
 
-/// The coordinates of a body.
+/// The coordinates of a track.
 const COORDINATES: usize = 3;
 
-/// The tables of scalars (None if there are none), their names, the coordinate of all bodies that each is, and why a library
+/// The tables of scalars (None if there are none), their names, the coordinate of all tracks that each is, and why a library
 /// has none although clips have some.
 type ScalarMotions = (Option<Motions>, Vec<String>, Vec<usize>, Option<String>);
 
@@ -56,20 +56,21 @@ pub(crate) fn scalar_motions(
     if names.is_empty() {
         return Ok((None, names, Vec::new(), None));
     }
-    let starts = bodies(&clips, &names);
-    let columns = starts.windows(2).enumerate().flat_map(|(body, ends)| {
-        let count = ends[1] - ends[0];
-        (0..count).map(move |coordinate| body * COORDINATES + coordinate)
-    });
+    let tracks = ScalarTracks::new(names.clone(), clips.iter().map(|clip| &*clip.motion));
+    let columns = tracks.coordinates();
+    let columns = columns.map(|[track, coordinate]| track * COORDINATES + coordinate);
     let columns = columns.collect();
     let parts = py.detach(|| {
         stoppable(|| {
-            let count = starts.len() - 1;
+            let count = tracks.track_count();
             let skeleton = Skeleton::new(vec![None; count], vec![Vec3::ZERO; count]);
             let skeleton = skeleton.map_err(|error| input(error.to_string()))?;
-            let clip = |listed: ListedClip<'_>| {
+            let clip = |_: usize, listed: ListedClip<'_>| {
                 let motion = &listed.clip.motion;
-                let set = set_of(motion, &names, &starts).map_err(|error| of_track(&error))?;
+                let mut set = TrackSet::new();
+                // No scalar rests: every clip has all of them.
+                let added = tracks.add_to(&mut set, motion, |_| 0.0);
+                added.map_err(|error| of_track(&error))?;
                 Ok(MotionClip {
                     set: Cow::Owned(set),
                     interpolation: method::SLERP.into(),
@@ -79,14 +80,13 @@ pub(crate) fn scalar_motions(
                     },
                 })
             };
-            built(
-                &skeleton,
-                (ticks_per_second, KeyPrecision::Exact),
-                &clips,
-                clip,
-            )
+            let options = (ticks_per_second, KeyPrecision::Exact);
+            let listed: Vec<_> = ListedClip::all(&clips).collect();
+            built(&skeleton, options, &listed, clip)
         })
     })?;
+    let (tables, spans, cells) = parts;
+    let parts = (Tables::Skeleton(tables), spans, cells);
     let motions = Motions::of_parts(py, parts, names.clone())?;
     Ok((Some(motions), names, columns, None))
 }
@@ -125,73 +125,20 @@ fn other_kind(first: &Motion, motion: &Motion, names: &[String]) -> Option<Strin
     })
 }
 
-fn scalar_of<'a>(motion: &'a Motion, name: &str) -> Option<(usize, ScalarKeys<'a>)> {
-    let index = motion.set.scalar_named(name)?;
-    Some((index, motion.set.scalar(index)?))
-}
-
-/// The first scalar of each body, and their number: the scalars of a body have the same key times in every clip.
-fn bodies(clips: &[Clip], names: &[String]) -> Vec<usize> {
-    let mut starts = vec![0];
-    for index in 1..names.len() {
-        let start = starts[starts.len() - 1];
-        let joins = |clip: &Clip| {
-            let keys = [start, index].map(|it| scalar_of(&clip.motion, &names[it]));
-            let [Some((_, first)), Some((_, next))] = keys else {
-                return false;
-            };
-            first.times == next.times && first.tangents.is_empty() == next.tangents.is_empty()
-        };
-        if index - start == COORDINATES || !clips.iter().all(joins) {
-            starts.push(index);
-        }
-    }
-    starts.push(names.len());
-    starts
-}
-
 /// The method of scalars: that of the library, or, where it has none, that of the clip's first scalar.
-fn vector_method(motion: &Motion, names: &[String], method: MethodChoice) -> VectorMethod {
+pub(super) fn vector_method(
+    motion: &Motion,
+    names: &[String],
+    method: MethodChoice,
+) -> VectorMethod {
     if let Some(method) = method.0 {
         return method.scalar_method();
     }
-    let first = names.first().and_then(|name| scalar_of(motion, name));
-    match first.and_then(|(index, _)| motion.scalar(index).interpolation) {
+    let first = names.iter().find_map(|name| motion.set.scalar_named(name));
+    match first.and_then(|index| motion.scalar(index).interpolation) {
         Some(ChannelInterpolation::Step) => VectorMethod::Step,
         Some(ChannelInterpolation::Linear) => VectorMethod::Linear,
         Some(ChannelInterpolation::Cubic) => VectorMethod::GltfCubic,
         None => VectorMethod::BesselOverhauser,
     }
-}
-
-/// The scalars of a clip as translations of bodies.
-fn set_of(motion: &Motion, names: &[String], starts: &[usize]) -> Result<TrackSet, TrackError> {
-    let mut set = TrackSet::new();
-    // The bodies have the start and the end of the clip.
-    let (first, last) = motion.set.time_span().unwrap_or_default();
-    let (ends, rest) = ([first, last], [Quat::IDENTITY; 2]);
-    let count = if first < last { 2 } else { 1 };
-    for (body, pair) in starts.windows(2).enumerate() {
-        set.push("", &ends[..count], &rest[..count])?;
-        let scalars = names[pair[0]..pair[1]].iter();
-        let scalars = scalars.filter_map(|name| scalar_of(motion, name));
-        let scalars: Vec<(f64, ScalarKeys<'_>)> = scalars
-            .map(|(index, keys)| (motion.scalar(index).origin, keys))
-            .collect();
-        let Some((_, keys)) = scalars.first() else {
-            continue;
-        };
-        let mut points = vec![Vec3::ZERO; keys.times.len()];
-        let mut tangents = vec![[Vec3::ZERO; 2]; keys.tangents.len()];
-        for (coordinate, (origin, keys)) in scalars.iter().enumerate() {
-            for (point, &key) in points.iter_mut().zip(keys.keys) {
-                point[coordinate] = (f64::from(key) + origin) as f32;
-            }
-            for (tangent, sides) in tangents.iter_mut().zip(keys.tangents) {
-                (tangent[0][coordinate], tangent[1][coordinate]) = (sides[0], sides[1]);
-            }
-        }
-        set.set_translations(body, keys.times, &points, &tangents)?;
-    }
-    Ok(set)
 }

@@ -140,7 +140,9 @@ pub(crate) fn trials(kernel: Kernel, random: &mut Random) -> Vec<Trial> {
         | Kernel::MotionWalk
         | Kernel::MotionDifferences
         | Kernel::MotionStore
-        | Kernel::MotionMatrices => motion::trials(kernel, random),
+        | Kernel::MotionMatrices
+        | Kernel::MotionTree
+        | Kernel::MotionPick => motion::trials(kernel, random),
         _ => segments::trials(kernel, random),
     }
 }

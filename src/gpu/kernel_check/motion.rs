@@ -4,8 +4,9 @@ use bytemuck::Zeroable as _;
 
 use crate::shader::{
     CHANNELS, CrowdBase, CrowdChannel, CrowdClip, CrowdLink, CrowdSpan, FORM_ARC, FORM_CONSTANT,
-    FORM_CUBIC, FORM_KEYS, FORM_LINE, FORM_PACKED, FORM_POLYNOMIAL, Kernel, MotionDispatch,
-    MotionSample, ON_KEY, POSITION, POWERS, ROTATION, STATE_VECTORS,
+    FORM_CUBIC, FORM_KEYS, FORM_LINE, FORM_PACKED, FORM_POLYNOMIAL, FRAME_BALL, FRAME_FIXED,
+    FRAME_FREE, FRAME_HINGE, FRAME_ROOT, FRAME_SLIDE, Kernel, MotionDispatch, MotionSample,
+    NO_FRAME, ON_KEY, POSITION, POWERS, ROTATION, STATE_VECTORS, TreeFrame, VECTOR_WORDS,
     WORLD_ROTATION,
 };
 
@@ -24,6 +25,8 @@ pub(super) fn trials(kernel: Kernel, random: &mut Random) -> Vec<Trial> {
         Kernel::MotionWalk => vec![walk(random, 0), walk(random, 1)],
         Kernel::MotionDifferences => vec![differences(random)],
         Kernel::MotionMatrices => vec![matrices(random, 6, 1), matrices(random, 9, 0)],
+        Kernel::MotionTree => vec![tree(random, 0), tree(random, 1)],
+        Kernel::MotionPick => vec![picked(random)],
         _ => vec![stored(random)],
     }
 }
@@ -190,4 +193,70 @@ fn matrices(random: &mut Random, numbers: u32, detail: u32) -> Trial {
     };
     let states = states(random, INSTANCES);
     Trial::new([bytes(&states)], &dispatch, groups(count as usize, false))
+}
+
+/// Frames of every kind: a root and one that is fixed in the world, each with others beneath it. Some hinges are turned
+/// by many turns.
+fn tree(random: &mut Random, moves: u32) -> Trial {
+    const WORDS: u32 = STATE_VECTORS * VECTOR_WORDS;
+    let kinds = [
+        FRAME_ROOT,
+        FRAME_HINGE,
+        FRAME_SLIDE,
+        FRAME_FIXED,
+        FRAME_FIXED,
+        FRAME_HINGE,
+        FRAME_BALL,
+        FRAME_FREE,
+        FRAME_HINGE,
+        FRAME_HINGE,
+    ];
+    let above = [NO_FRAME, 0, 1, 2, NO_FRAME, 4, 5, 6, 7, 3];
+    let root_of = [
+        0, 0, 0, 0, NO_FRAME, NO_FRAME, NO_FRAME, NO_FRAME, NO_FRAME, 0,
+    ];
+    let frame = |random: &mut Random, index: usize| {
+        let track = random.below(JOINTS) * WORDS;
+        let is_scalar = matches!(kinds[index], FRAME_HINGE | FRAME_SLIDE);
+        let coordinate = POSITION * VECTOR_WORDS + random.below(3);
+        let [x, y, z, _] = random.rotation();
+        TreeFrame {
+            offset: random.vector(),
+            above: above[index],
+            rest: random.rotation(),
+            axis: [x, y, z],
+            kind: kinds[index],
+            source: if is_scalar { track + coordinate } else { track },
+            root: root_of[index],
+            multiplier: 1.0 + random.parameter(),
+            shift: [0.0, -0.7, 1000.0][random.below(3) as usize],
+        }
+    };
+    let frames: Vec<TreeFrame> = (0..kinds.len()).map(|index| frame(random, index)).collect();
+    let tracks = states(random, INSTANCES);
+    let before = vec![[0.0; 4]; kinds.len() * (INSTANCES * STATE_VECTORS) as usize];
+    let dispatch = MotionDispatch {
+        links: kinds.len() as u32,
+        ..arguments(INSTANCES, moves)
+    };
+    let inputs = [bytes(&frames), bytes(&tracks)];
+    Trial::new(inputs, &dispatch, groups(INSTANCES as usize, true)).over(&before)
+}
+
+fn picked(random: &mut Random) -> Trial {
+    const NUMBERS: u32 = 9;
+    const FIRST: u32 = 4;
+    let vectors = JOINTS * STATE_VECTORS;
+    let pick = |random: &mut Random| random.below(vectors * VECTOR_WORDS);
+    let picks: Vec<u32> = (0..FIRST + NUMBERS).map(|_| pick(random)).collect();
+    let count = INSTANCES * NUMBERS;
+    let dispatch = MotionDispatch {
+        vector: FIRST,
+        numbers: NUMBERS,
+        joints: vectors,
+        ..arguments(count, 0)
+    };
+    let states = states(random, INSTANCES);
+    let inputs = [bytes(&picks), bytes(&states)];
+    Trial::new(inputs, &dispatch, groups(count as usize, false))
 }

@@ -3,18 +3,21 @@
 //!
 //! * [`Tree`]: [`TreeBody`]s, each with the [`TreeJoint`]s that connect it with its parent.
 //! * [`Configuration`]: a value for each joint; [`ConfigurationRates`]: how fast they change.
+//! * [`Tree::frames`]: constants in f32, with which libraries of motions compute the bodies, on the CPU or on a device.
 //! * [`Tree::poses`] and [`Tree::motions`] compute the bodies in f64, with the same bits on every processor.
 //!
 //! The formulas are those of `MuJoCo`'s kinematics (`mj_kinematics`): a body's joints act in their order, each about
 //! its anchor.
 
 mod configuration;
+pub(crate) mod frames;
 mod kinematics;
 mod order;
 
 use glam::{DQuat, DVec3};
 
 pub use configuration::{BodyMotion, BodyPose, BodyVelocity, Configuration, ConfigurationRates};
+pub use frames::{FrameWords, JointTracks, TreeFrames};
 pub use order::{BodyOrder, Siblings};
 
 use crate::names::names;
@@ -186,6 +189,14 @@ pub enum TreeError {
         /// Why it cannot.
         reason: &'static str,
     },
+    /// A body does not exist.
+    #[error("there is no body {body}; there are {count}, from 0")]
+    MissingBody {
+        /// The index.
+        body: usize,
+        /// How many bodies the tree has.
+        count: usize,
+    },
     /// A configuration has not one value for each joint.
     #[error("{found} {kind} were given, and the tree has {expected}; give one for each")]
     Count {
@@ -250,6 +261,20 @@ impl Tree {
     pub fn scalar_joints(&self) -> impl Iterator<Item = &TreeJoint> {
         self.joints().filter(|joint| {
             matches!(joint.kind, JointKind::Hinge | JointKind::Slide) && joint.mimic.is_none()
+        })
+    }
+
+    /// All hinges and slides, each with the index in [`Configuration::scalars`] of the value that moves it, and the factor
+    /// and the offset with which it does: 1 and 0 but for joints that mimic others.
+    pub fn scalar_values(&self) -> impl Iterator<Item = (&TreeJoint, usize, [f64; 2])> {
+        let pairs = self.joints().zip(&self.values);
+        pairs.filter_map(|(joint, value)| match *value {
+            JointValue::Scalar {
+                index,
+                multiplier,
+                offset,
+            } => Some((joint, index, [multiplier, offset])),
+            JointValue::Ball(_) | JointValue::Free(_) => None,
         })
     }
 
