@@ -62,8 +62,10 @@ pub(crate) const DEGREES: f32 = 57.29578;
 pub(crate) const END_NEGATED: u32 = 2147483648;
 pub(crate) const FLUSHED_BITS: u32 = 645922816;
 pub(crate) const FORM_ARC: u32 = 1;
+pub(crate) const FORM_ARC_KEYS: u32 = 19;
 pub(crate) const FORM_CONSTANT: u32 = 0;
 pub(crate) const FORM_CUBIC: u32 = 2;
+pub(crate) const FORM_CUBIC_KEYS: u32 = 20;
 pub(crate) const FORM_KEYS: u32 = 16;
 pub(crate) const FORM_LINE: u32 = 18;
 pub(crate) const FORM_PACKED: u32 = 17;
@@ -92,6 +94,7 @@ pub(crate) const LOG_2: f32 = 0.075;
 pub(crate) const LOG_3: f32 = 0.04464286;
 pub(crate) const LOG_4: f32 = 0.030381944;
 pub(crate) const LONGEST_ANGLE_SQUARE: f32 = 2.4674;
+pub(crate) const LONGEST_KEY: f32 = 4.0;
 pub(crate) const LONGEST_STEP: f32 = 0.0034;
 pub(crate) const LONGEST_TANGENT_PART: f32 = 0.01;
 pub(crate) const MAX_SUBGROUP_JOINTS: u32 = 1024;
@@ -153,6 +156,7 @@ pub(crate) const SINE_7: f32 = -0.00019806049;
 pub(crate) const SINE_9: f32 = 2.5989254e-6;
 pub(crate) const SMALL_SQUARED_EXTENT: f32 = 0.001;
 pub(crate) const SNORM_SHIFT: f32 = 12582912.0;
+pub(crate) const SOURCE_BITS: u32 = 8388607;
 pub(crate) const SPEED_MAGNITUDE: u32 = 8388607;
 pub(crate) const SPREAD_WORKGROUP: u32 = 128;
 pub(crate) const START_BIAS: u32 = 131072;
@@ -965,6 +969,8 @@ pub(crate) enum Kernel {
     CrowdPlainRotations,
     CrowdLocals,
     CrowdPlainLocals,
+    CrowdCompactRotations,
+    CrowdCompactLocals,
     CrowdGather,
     CrowdScatter,
     CrowdTimes,
@@ -976,6 +982,8 @@ pub(crate) enum Kernel {
     CrowdPlainWholeRotations,
     CrowdWholeMatrices,
     CrowdPlainWholeMatrices,
+    CrowdCompactWholeRotations,
+    CrowdCompactWholeMatrices,
     CrowdSubgroupRotations,
     CrowdSubgroupRotationsF16,
     MotionJoints,
@@ -1126,7 +1134,7 @@ impl Kernel {
         }
     }
 }
-pub(crate) static KERNELS: [KernelCode; 144] = [
+pub(crate) static KERNELS: [KernelCode; 148] = [
     KernelCode { kernel: Kernel::SelfTest, storage: ("self_test", 1946), texels: None, converting: None, bindings: &[Read, Write], segments: None, subgroups: false },
     KernelCode { kernel: Kernel::ArcFramesAxisAngle, storage: ("arc_frames_axis_angle", 2963), texels: Some(("arc_frames_axis_angle_texels", 3089)), converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::Frames, Store::AxisAngle)), subgroups: false },
     KernelCode { kernel: Kernel::ArcFramesEuler, storage: ("arc_frames_euler", 3619), texels: Some(("arc_frames_euler_texels", 3737)), converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::Frames, Store::Euler)), subgroups: false },
@@ -1253,6 +1261,8 @@ pub(crate) static KERNELS: [KernelCode; 144] = [
     KernelCode { kernel: Kernel::CrowdPlainRotations, storage: ("crowd_plain_rotations", 2408), texels: Some(("crowd_plain_rotations_texels", 2500)), converting: None, bindings: &[Read, Read, Read, Read, Write], segments: None, subgroups: false },
     KernelCode { kernel: Kernel::CrowdLocals, storage: ("crowd_locals", 6392), texels: Some(("crowd_locals_texels", 6478)), converting: None, bindings: &[Read, Read, Read, Read, Write], segments: None, subgroups: false },
     KernelCode { kernel: Kernel::CrowdPlainLocals, storage: ("crowd_plain_locals", 3009), texels: Some(("crowd_plain_locals_texels", 3101)), converting: None, bindings: &[Read, Read, Read, Read, Write], segments: None, subgroups: false },
+    KernelCode { kernel: Kernel::CrowdCompactRotations, storage: ("crowd_compact_rotations", 11720), texels: Some(("crowd_compact_rotations_texels", 11802)), converting: None, bindings: &[Read, Read, Read, Read, Write], segments: None, subgroups: false },
+    KernelCode { kernel: Kernel::CrowdCompactLocals, storage: ("crowd_compact_locals", 12317), texels: Some(("crowd_compact_locals_texels", 12399)), converting: None, bindings: &[Read, Read, Read, Read, Write], segments: None, subgroups: false },
     KernelCode { kernel: Kernel::CrowdGather, storage: ("crowd_gather", 565), texels: None, converting: None, bindings: &[Read, Read, Write], segments: None, subgroups: false },
     KernelCode { kernel: Kernel::CrowdScatter, storage: ("crowd_scatter", 463), texels: None, converting: None, bindings: &[Read, Write], segments: None, subgroups: false },
     KernelCode { kernel: Kernel::CrowdTimes, storage: ("crowd_times", 2463), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Write], segments: None, subgroups: false },
@@ -1264,6 +1274,8 @@ pub(crate) static KERNELS: [KernelCode; 144] = [
     KernelCode { kernel: Kernel::CrowdPlainWholeRotations, storage: ("crowd_plain_whole_rotations", 5294), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Read, Read, Write, Write], segments: None, subgroups: false },
     KernelCode { kernel: Kernel::CrowdWholeMatrices, storage: ("crowd_whole_matrices", 10662), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Read, Read, Read, Read, Write, Write], segments: None, subgroups: false },
     KernelCode { kernel: Kernel::CrowdPlainWholeMatrices, storage: ("crowd_plain_whole_matrices", 7321), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Read, Read, Read, Read, Write, Write], segments: None, subgroups: false },
+    KernelCode { kernel: Kernel::CrowdCompactWholeRotations, storage: ("crowd_compact_whole_rotations", 14552), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Read, Read, Write, Write], segments: None, subgroups: false },
+    KernelCode { kernel: Kernel::CrowdCompactWholeMatrices, storage: ("crowd_compact_whole_matrices", 16575), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Read, Read, Read, Read, Write, Write], segments: None, subgroups: false },
     KernelCode { kernel: Kernel::CrowdSubgroupRotations, storage: ("crowd_subgroup_rotations", 4538), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Read, Read, Write], segments: None, subgroups: true },
     KernelCode { kernel: Kernel::CrowdSubgroupRotationsF16, storage: ("crowd_subgroup_rotations_f16", 4786), texels: None, converting: Some(("crowd_subgroup_rotations_f16_converting", 4619)), bindings: &[Read, Read, Read, Read, Read, Read, Write], segments: None, subgroups: true },
     KernelCode { kernel: Kernel::MotionJoints, storage: ("motion_joints", 8600), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Read, Read, Write], segments: None, subgroups: false },

@@ -2,6 +2,7 @@
 //! device, in any second of any day.
 
 mod application_device;
+mod compact;
 mod device_motions;
 mod fades;
 mod refusals;

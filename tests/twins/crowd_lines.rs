@@ -6,6 +6,7 @@ use glam::{Affine3A, Vec3};
 
 use crate::crowd::layer::CrowdLayer;
 use crate::crowd::library::CrowdLibrary;
+use crate::machine::crowd::CrowdCurves;
 use crate::method::Method;
 use crate::method::bessel_overhauser::BESSEL_OVERHAUSER;
 use crate::method::slerp::SLERP;
@@ -60,15 +61,15 @@ fn assert_stores_whole_lines(
         clock_low: CLOCK as u32,
         ..library.arguments(layers)
     };
-    let is_plain = layers == 1 && library.tables.has_only_arcs();
+    let curves = CrowdCurves::new(library.tables.forms(), layers as u32);
     let (kernel, pushed, groups) = match subgroup_lanes {
         None => {
-            let whole = WholeInstances::new(&arguments, output, is_plain).expect("it is small");
+            let whole = WholeInstances::new(&arguments, output, curves).expect("it is small");
             let (pushed, groups) = whole.dispatch(arguments, &library.levels);
             (whole.kernel, bytemuck::bytes_of(&pushed).to_vec(), groups)
         }
         Some(lanes) => {
-            let whole = SubgroupInstances::new(&arguments, output, is_plain, lanes).unwrap();
+            let whole = SubgroupInstances::new(&arguments, output, curves, lanes).unwrap();
             let (pushed, groups) = whole.dispatch(&arguments);
             let pushed = bytemuck::bytes_of(&pushed).to_vec();
             (whole.kernel(), pushed, groups)
