@@ -3,8 +3,8 @@
 use bytemuck::Zeroable as _;
 
 use crate::shader::{
-    CrowdSpan, FORM_ARC, FORM_CONSTANT, FORM_CUBIC, FORM_CUBIC_KEYS, FORM_KEYS, FORM_LINE, FORM_PACKED, ON_KEY,
-    POWERS, PolynomialSegment,
+    CrowdSpan, FORM_ARC, FORM_CONSTANT, FORM_CUBIC, FORM_CUBIC_KEYS, FORM_KEYS, FORM_LINE,
+    FORM_PACKED, ON_KEY, POWERS, PolynomialSegment,
 };
 use crate::simd::lanes::{Lanes, MAX_LANES};
 use crate::time::runs::NONE;

@@ -20,7 +20,8 @@ use crate::prepare::clip_data::{ClipData, PrepareRequest};
 use crate::prepare::vectors::VectorRequest;
 use crate::shader::{
     CHANNELS, CrowdBase, CrowdChannel, CrowdClip, CrowdPosition, CrowdSpan, FORM_ARC,
-    FORM_CONSTANT, FORM_CUBIC, FORM_CUBIC_KEYS, FORM_PACKED, FORM_POLYNOMIAL, Form, ON_KEY, POWERS, SCALE,
+    FORM_CONSTANT, FORM_CUBIC, FORM_CUBIC_KEYS, FORM_PACKED, FORM_POLYNOMIAL, Form, ON_KEY, POWERS,
+    SCALE,
 };
 use crate::simd::lanes::{Lanes, MAX_LANES, canonical};
 use crate::time::frame_clock::{FrameClock, FrameStart, TrackCopy, in_frames};
@@ -318,8 +319,7 @@ impl ClipTables {
                 };
                 last = Some((&curve.spans, base));
             }
-            let is_same =
-                |list: &&[[f32; 4]]| bytes_of(list) == bytes_of(curve.weights.as_slice());
+            let is_same = |list: &&[[f32; 4]]| bytes_of(list) == bytes_of(curve.weights.as_slice());
             let list = lists.iter().position(is_same).unwrap_or_else(|| {
                 lists.push(&curve.weights);
                 lists.len() - 1
@@ -466,7 +466,9 @@ impl ClipTables {
             };
             curve.keys.push(key);
             if is_compact(form) {
-                curve.constants.extend(constants_of_keys(&self.cells, channel, row));
+                curve
+                    .constants
+                    .extend(constants_of_keys(&self.cells, channel, row));
                 continue;
             }
             let powers = constants_of(form);

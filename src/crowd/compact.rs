@@ -15,8 +15,8 @@ use crate::method::interpolation::Interpolation;
 use crate::names::names;
 use crate::shader::{
     CrowdChannel, CrowdPosition, CrowdSpan, FORM_ARC, FORM_ARC_KEYS, FORM_CUBIC, FORM_CUBIC_KEYS,
-    FORM_LINE, FORM_POLYNOMIAL, KEY_INNER, KEY_UNKNOWN, ON_KEY, POWERS, PolynomialSegment, SOURCE_BITS,
-    TICKS, TangentWeights,
+    FORM_LINE, FORM_POLYNOMIAL, KEY_INNER, KEY_UNKNOWN, ON_KEY, POWERS, PolynomialSegment,
+    SOURCE_BITS, TICKS, TangentWeights,
 };
 use crate::simd::lanes::{self, Lanes, MAX_LANES};
 use crate::tracks::set::TrackSet;
@@ -261,7 +261,10 @@ pub(crate) fn compact_vectors(curve: &mut ChannelCurve, last: [f32; 4]) {
 
 /// Adds a group of cubics with the same spans and weights to the cells. Returns the cell of the first key, and that of the
 /// first weights.
-pub(crate) fn add_cubics(cells: &mut Vec<[f32; 4]>, members: &[(usize, &ChannelCurve)]) -> [usize; 2] {
+pub(crate) fn add_cubics(
+    cells: &mut Vec<[f32; 4]>,
+    members: &[(usize, &ChannelCurve)],
+) -> [usize; 2] {
     let group = cells.len();
     let rows = &members[0].1.weights;
     let of_sources = members.len().div_ceil(4);
@@ -275,8 +278,8 @@ pub(crate) fn add_cubics(cells: &mut Vec<[f32; 4]>, members: &[(usize, &ChannelC
                 8 => 1,
                 _ => 2,
             };
-            let place = rows.len() * stride + packed.len();
-            sources[span * of_sources * 4 + member] = (place as u32) << 2 | shortened;
+            let offset = rows.len() * stride + packed.len();
+            sources[span * of_sources * 4 + member] = (offset as u32) << 2 | shortened;
             packed.extend_from_slice(&segment.coefficients[..7 + 2 * shortened as usize]);
         }
     }
@@ -301,7 +304,8 @@ pub(crate) fn rotations<L: Lanes>(
     values: &mut [[f32; 4]],
 ) {
     let span = position.span & TICKS;
-    let cubic = (channel.form_and_base >> 24 == FORM_CUBIC_KEYS).then(|| CubicRows::of(cells, channel));
+    let cubic =
+        (channel.form_and_base >> 24 == FORM_CUBIC_KEYS).then(|| CubicRows::of(cells, channel));
     let key = match &cubic {
         Some((rows, member)) => rows.key(span as usize, *member),
         None => (channel.first + span * channel.count) as usize,
@@ -311,7 +315,12 @@ pub(crate) fn rotations<L: Lanes>(
             *value = authored_key(stored);
         }
     } else if let Some((rows, member)) = cubic {
-        cubics::<L>(cells, (rows, span as usize, member), position.parameter, values);
+        cubics::<L>(
+            cells,
+            (rows, span as usize, member),
+            position.parameter,
+            values,
+        );
     } else {
         let next = key + channel.count as usize;
         for (first, values) in (0..).step_by(L::COUNT).zip(values.chunks_mut(L::COUNT)) {
@@ -335,7 +344,10 @@ fn cubics<L: Lanes>(
 ) {
     let ([before, start, end, after], [first, last]) = rows.around(row);
     let are_known = first.kind != KEY_UNKNOWN && last.kind != KEY_UNKNOWN;
-    for (member, values) in (member..).step_by(L::COUNT).zip(values.chunks_mut(L::COUNT)) {
+    for (member, values) in (member..)
+        .step_by(L::COUNT)
+        .zip(values.chunks_mut(L::COUNT))
+    {
         if are_known {
             let curve = small_angle_cubic(
                 continued_key(load::<L>(cells, rows.key(before, member))),

@@ -140,14 +140,14 @@ impl CrowdLibrary {
     /// # use tumble::glam::{Quat, Vec3};
     /// # use tumble::crowd::{CrowdLibrary, CrowdStorage};
     /// # use tumble::{Skeleton, TrackSet, VectorMethod, method};
-    /// let mut turn = TrackSet::new();
+    /// let mut spin = TrackSet::new();
     /// let times: Vec<f64> = (0..300).map(|key| f64::from(key) / 30.0).collect();
     /// let keys: Vec<Quat> = times.iter().map(|time| Quat::from_rotation_y(*time as f32)).collect();
-    /// turn.push("hip", &times, &keys)?;
+    /// spin.push("hip", &times, &keys)?;
     /// let skeleton = Skeleton::new(vec![None], vec![Vec3::ZERO])?;
     /// let mut library = CrowdLibrary::new(&skeleton)?;
     /// library.set_storage(CrowdStorage::Compact);
-    /// library.push(&turn, method::BESSEL_OVERHAUSER, VectorMethod::Linear)?;
+    /// library.push(&spin, method::BESSEL_OVERHAUSER, VectorMethod::Linear)?;
     /// assert!(library.bytes_per_key() < 60.0); // 16 for the times, which other joints share
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```

@@ -5,7 +5,8 @@ use glam::Vec4;
 use crate::math::canonical::{canonical, round_f32};
 use crate::shader::{
     ArcSegment, CrowdChannel, CrowdPosition, FORM_ARC, FORM_ARC_KEYS, FORM_CUBIC, FORM_CUBIC_KEYS,
-    FORM_LINE, FORM_POLYNOMIAL, KEY_INNER, LONGEST_KEY, ON_KEY, POWERS, PolynomialSegment, SOURCE_BITS, TICKS, TangentWeights,
+    FORM_LINE, FORM_POLYNOMIAL, KEY_INNER, LONGEST_KEY, ON_KEY, POWERS, PolynomialSegment,
+    SOURCE_BITS, TICKS, TangentWeights,
 };
 use crate::simd::lanes::Choice;
 use crate::twin::Evaluate as _;
@@ -225,8 +226,7 @@ pub(crate) fn value_of_keys(
                 }
                 (_, true) => authored_key(start),
                 (_, false) => {
-                    let (middle, tangent) =
-                        arc_between(continued_key(start), continued_key(end()));
+                    let (middle, tangent) = arc_between(continued_key(start), continued_key(end()));
                     ArcSegment { middle, tangent }.value_at(s)
                 }
             }

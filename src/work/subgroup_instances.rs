@@ -99,7 +99,12 @@ mod tests {
     fn subgroups_take_as_many_instances_as_there_is_room_for() {
         let rotations = CrowdOutput::from(CrowdValues::Rotations);
         let instances = |joints, bases| {
-            let found = SubgroupInstances::new(&arguments(joints, bases), rotations, CrowdCurves::Plain, 32);
+            let found = SubgroupInstances::new(
+                &arguments(joints, bases),
+                rotations,
+                CrowdCurves::Plain,
+                32,
+            );
             found.map(|found| 1 << found.instances_log2)
         };
         assert_eq!(instances(60, 1), Some(4));
@@ -114,7 +119,8 @@ mod tests {
         assert_eq!(instances(1032, 1), None);
         // In half precision, a line has twice as many values.
         let half = CrowdOutput::half(CrowdValues::Rotations);
-        let of_half = |joints| SubgroupInstances::new(&arguments(joints, 1), half, CrowdCurves::Plain, 32);
+        let of_half =
+            |joints| SubgroupInstances::new(&arguments(joints, 1), half, CrowdCurves::Plain, 32);
         assert_eq!(of_half(60).map(|found| found.instances_log2), Some(2));
         assert_eq!(of_half(2), None);
     }
@@ -146,7 +152,8 @@ mod tests {
         let rotations = CrowdOutput::from(CrowdValues::Rotations);
         for joints in 1..=MAX_SUBGROUP_JOINTS {
             let arguments = arguments(joints, 1);
-            let Some(found) = SubgroupInstances::new(&arguments, rotations, CrowdCurves::Plain, 32) else {
+            let Some(found) = SubgroupInstances::new(&arguments, rotations, CrowdCurves::Plain, 32)
+            else {
                 continue;
             };
             let (pushed, groups) = found.dispatch(&arguments);

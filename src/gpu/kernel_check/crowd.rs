@@ -3,8 +3,8 @@
 use crate::machine::crowd::CrowdCurves;
 use crate::shader::{
     CHANNELS, CrowdBase, CrowdChange, CrowdChannel, CrowdClip, CrowdDispatch, CrowdEntry,
-    CrowdLink, CrowdPosition, CrowdSpan, FORM_ARC, FORM_CONSTANT, FORM_CUBIC, FORM_POLYNOMIAL,
-    FORM_ARC_KEYS, FORM_CUBIC_KEYS, FORM_LINE, KEY_AT_END, Kernel, ON_KEY, ROTATION,
+    CrowdLink, CrowdPosition, CrowdSpan, FORM_ARC, FORM_ARC_KEYS, FORM_CONSTANT, FORM_CUBIC,
+    FORM_CUBIC_KEYS, FORM_LINE, FORM_POLYNOMIAL, KEY_AT_END, Kernel, ON_KEY, ROTATION,
     RUNS_BACKWARDS, SPEED_MAGNITUDE, START_BIAS, TangentWeights,
 };
 use crate::twin::crowd_compact::SOURCE_FLOAT;
@@ -263,8 +263,7 @@ fn joints(random: &mut Random, layers: u32, curves: CrowdCurves, are_locals: boo
             entry(random, clip, 1 << 20, 0)
         })
         .collect();
-    let compact =
-        (curves == CrowdCurves::Compact).then(|| CompactGroups::new(random, CELLS));
+    let compact = (curves == CrowdCurves::Compact).then(|| CompactGroups::new(random, CELLS));
     let channels: Vec<_> = (0..CLIPS * JOINTS * CHANNELS)
         .map(|i| match (&compact, curves, i % CHANNELS == ROTATION) {
             (Some(groups), ..) => groups.channel(random),

@@ -15,8 +15,8 @@ use crate::work::whole_instances::joint_share;
 use bytemuck::Zeroable as _;
 
 use super::crowd::{
-    BASES, BEFORE, CELLS, CLIPS, CompactGroups, JOINTS, LEVELS, MASKS, channel, entry, links_of_levels, plain,
-    rows,
+    BASES, BEFORE, CELLS, CLIPS, CompactGroups, JOINTS, LEVELS, MASKS, channel, entry,
+    links_of_levels, plain, rows,
 };
 use super::random::Random;
 use super::{Trial, bytes};
@@ -159,8 +159,7 @@ impl WholeScene {
                 }));
             }
         }
-        let compact =
-            (curves == CrowdCurves::Compact).then(|| CompactGroups::new(random, cells));
+        let compact = (curves == CrowdCurves::Compact).then(|| CompactGroups::new(random, cells));
         let channels = (0..CLIPS * joints * CHANNELS).map(|index| {
             let any = match (&compact, is_plain, index % CHANNELS == ROTATION) {
                 (Some(groups), ..) => groups.channel(random),
