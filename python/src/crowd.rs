@@ -4,7 +4,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use tumble::crowd::{CrowdLayer, CrowdLibrary, CrowdValues, LayerBlend};
+use tumble::crowd::{CrowdLayer, CrowdLibrary, CrowdStorage, CrowdValues, LayerBlend};
 use tumble::{ComponentType, WrapMode};
 
 use crate::arrays::{ArrayValues, ListArgument, doubles};
@@ -29,14 +29,15 @@ const MANY: usize = 1 << 20;
 /// Many instances of a skeleton, each of which plays clips at a separate time and speed: poses for skinning.
 ///
 /// `Crowd(clips, instances, *, layers=1, method="slerp", parents=None, offsets=None, masks=None,
-/// inverse_bind=None, references=None, ticks_per_second=705600, engine=None)`
+/// inverse_bind=None, references=None, ticks_per_second=705600, storage="segments", engine=None)`
 ///
 /// `clips`: clips of one skeleton, whose joints are matched by name, by index only if no clip has names. The skeleton
 /// is that of the first clip, or given by `parents` and `offsets` for its tracks; without `offsets` each clip keeps its
 /// own. A clip that has parents but no offsets can only be evaluated as "rotations". `layers`: the number of layers of an instance, 1 to 4, each blended over the ones below. `masks`: lists of a weight from 0 to 1
 /// for each joint, by which a layer's weight is multiplied. `inverse_bind`: (joints, 3, 4) or (joints, 4, 4), for the
 /// values "skinning". `references`: {clip: (other clip, seconds)}, the reference pose for additive layers of a clip;
-/// the default is the first pose of the clip.
+/// the default is the first pose of the clip. `storage`: "segments", or "compact" for a third to a sixth of the memory
+/// where keys are close; poses have the same bits and take longer.
 ///
 /// All instances follow one clock, which counts whole ticks: a clip in a loop gives the same bits in the
 /// first second and a day later, on the CPU and every Vulkan device. At the start all play the first clip
@@ -100,8 +101,9 @@ impl Crowd {
     #[new]
     #[pyo3(signature = (
         clips, instances, *, layers=1, method="slerp", parents=None, offsets=None, masks=None,
-        inverse_bind=None, references=None, ticks_per_second=TICKS, engine=None
-    ), text_signature = "(clips, instances, *, layers=1, method='slerp', parents=None, offsets=None, masks=None, inverse_bind=None, references=None, ticks_per_second=705600, engine=None)")]
+        inverse_bind=None, references=None, ticks_per_second=TICKS, storage="segments",
+        engine=None
+    ), text_signature = "(clips, instances, *, layers=1, method='slerp', parents=None, offsets=None, masks=None, inverse_bind=None, references=None, ticks_per_second=705600, storage='segments', engine=None)")]
     #[allow(clippy::too_many_arguments, reason = "keywords")]
     fn new(
         py: Python<'_>,
@@ -115,6 +117,7 @@ impl Crowd {
         inverse_bind: Option<&Bound<'_, PyAny>>,
         references: Option<&Bound<'_, PyDict>>,
         ticks_per_second: u32,
+        storage: &str,
         engine: Option<&Bound<'_, Engine>>,
     ) -> PyResult<Self> {
         let clips = clips.0;
@@ -122,6 +125,7 @@ impl Crowd {
             return Err(input("clips: give at least one"));
         };
         let method = method_named(method)?;
+        let storage: CrowdStorage = option_named(storage, "storage")?;
         let tracks = first.motion.set.track_count();
         let chosen = match parents {
             Some(parents) => ChosenSkeleton::of_arrays(&parents.0, offsets, tracks)?,
@@ -153,6 +157,7 @@ impl Crowd {
             stoppable(|| {
                 let made = CrowdLibrary::with_ticks(&skeleton, ticks_per_second);
                 let mut library = made.map_err(of_crowd)?;
+                library.set_storage(storage);
                 for listed in ListedClip::all(&clips) {
                     let (tracks, of_rotations, of_vectors) = fitted(&shared, listed, method)?;
                     let pushed = library.push(&tracks, of_rotations, of_vectors);
@@ -366,6 +371,18 @@ impl Crowd {
     #[getter]
     fn layers(&self) -> usize {
         self.layers
+    }
+
+    /// Bytes of the clips divided by the number of their keys, on the CPU and on devices.
+    ///
+    /// >>> import numpy as np, tumble
+    /// >>> keys = [[[0, np.sin(angle), 0, np.cos(angle)] for angle in np.arange(300) / 99]] * 20
+    /// >>> walk = tumble.Clip(np.arange(300) / 30, keys, parents=[None] * 20)
+    /// >>> tumble.Crowd([walk], 3, storage="compact").bytes_per_key < 20
+    /// True
+    #[getter]
+    fn bytes_per_key(&self) -> f64 {
+        self.lock().library().bytes_per_key()
     }
 
     fn __repr__(&self) -> String {

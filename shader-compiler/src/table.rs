@@ -213,7 +213,11 @@ const FROM_KEYS: [(&str, &[&str], usize); 3] = [
         ],
         2,
     ),
-    ("cubics", &["math/vector", "from_keys/small_angle"], 3),
+    (
+        "cubics",
+        &["math/vector", "math/norm_squared", "from_keys/small_angle"],
+        3,
+    ),
 ];
 
 /// The kernel that prepares arcs: its files.
@@ -255,6 +259,23 @@ const CHANNELS: [&str; 10] = [
     "crowd/layer_value",
 ];
 
+/// The same where clips are stored compactly, in part as keys.
+const COMPACT_CHANNELS: [&str; 13] = [
+    "math/canonical",
+    "math/sine_cosine",
+    "math/arc_tangent",
+    "math/quaternion",
+    "math/vector",
+    "math/polynomial",
+    "forms/evaluate_arc",
+    "from_keys/arc_between",
+    "from_keys/small_angle",
+    "crowd/entry",
+    "crowd/cubic",
+    "crowd/sampled",
+    "crowd/compact",
+];
+
 /// The same where it is simple, beside a file with the curves of translations and scales.
 const PLAIN_CHANNELS: [&str; 7] = [
     "math/canonical",
@@ -276,7 +297,7 @@ static CROWD_READS: [Read; 4] = [
 
 /// Kernels that evaluate the joints of a crowd, each with the files that it needs behind some that
 /// it shares.
-const CROWD_JOINTS: [(&str, &[&str], &[&str]); 4] = [
+const CROWD_JOINTS: [(&str, &[&str], &[&str]); 6] = [
     ("rotations", &CHANNELS, &["crowd/layers", "crowd/rotations"]),
     (
         "plain_rotations",
@@ -299,6 +320,21 @@ const CROWD_JOINTS: [(&str, &[&str], &[&str]); 4] = [
         &[
             "math/matrix",
             "crowd/plain_cubic",
+            "crowd/transform",
+            "crowd/locals",
+        ],
+    ),
+    (
+        "compact_rotations",
+        &COMPACT_CHANNELS,
+        &["crowd/layers", "crowd/rotations"],
+    ),
+    (
+        "compact_locals",
+        &COMPACT_CHANNELS,
+        &[
+            "math/matrix",
+            "crowd/layers",
             "crowd/transform",
             "crowd/locals",
         ],
@@ -387,7 +423,7 @@ const WHOLE_MATRICES: [&str; 5] = [
 const WHOLE_CUBIC: [&str; 1] = ["crowd/cubic_or_constant"];
 
 /// Kernels over whole instances, for cards, each with the files that it needs beside those that it shares.
-const CROWD_WHOLE: [(&str, &[&[&str]]); 4] = [
+const CROWD_WHOLE: [(&str, &[&[&str]]); 6] = [
     (
         "whole_rotations",
         &[&CHANNELS, &["crowd/layers", "crowd/whole_rotations"]],
@@ -403,6 +439,17 @@ const CROWD_WHOLE: [(&str, &[&[&str]]); 4] = [
     (
         "plain_whole_matrices",
         &[&PLAIN_CHANNELS, &WHOLE_CUBIC, &WHOLE_MATRICES],
+    ),
+    (
+        "compact_whole_rotations",
+        &[
+            &COMPACT_CHANNELS,
+            &["crowd/layers", "crowd/whole_rotations"],
+        ],
+    ),
+    (
+        "compact_whole_matrices",
+        &[&COMPACT_CHANNELS, &["crowd/layers"], &WHOLE_MATRICES],
     ),
 ];
 

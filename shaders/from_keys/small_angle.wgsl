@@ -253,7 +253,3 @@ fn small_angle_cubic(
         is_valid,
     );
 }
-
-fn norm_squared(q: vec4f) -> f32 {
-    return q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w;
-}

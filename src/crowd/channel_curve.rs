@@ -1,9 +1,11 @@
 //! The curve of one channel of a clip, before it is stored in the tables of a library.
 
 use crate::shader::{
-    CrowdSpan, FORM_ARC, FORM_CONSTANT, FORM_CUBIC, FORM_KEYS, FORM_LINE, FORM_PACKED, POWERS,
+    CrowdSpan, FORM_ARC, FORM_CONSTANT, FORM_CUBIC, FORM_CUBIC_KEYS, FORM_KEYS, FORM_LINE,
+    FORM_PACKED, POWERS, PolynomialSegment,
 };
 use crate::simd::lanes::{Lanes, MAX_LANES};
+use crate::time::runs::NONE;
 use crate::twin::arc_between::arc_between;
 
 /// One channel before it is stored in the tables: its spans, and the constants of each.
@@ -16,6 +18,20 @@ pub(crate) struct ChannelCurve {
     /// The key at the start of each span, 0 if there is none. Samples at a tick have its bits if the span says that it
     /// starts there.
     pub(crate) keys: Vec<[f32; 4]>,
+    /// The index in its track of each span's key; [`NONE`] if there is none.
+    pub(crate) key_indices: Vec<u32>,
+    /// Cubics that are stored compactly: the weights of the tangent at each key, and the intervals that are segments, each
+    /// with its span. `constants` are the keys.
+    pub(crate) weights: Vec<[f32; 4]>,
+    pub(crate) segments: Vec<(usize, PolynomialSegment)>,
+}
+
+/// The key at the start of a span.
+#[derive(Clone, Copy)]
+pub(crate) struct SpanKey {
+    pub(crate) value: [f32; 4],
+    /// Its index in the track; [`NONE`] for a value that is held before the first key.
+    pub(crate) index: u32,
 }
 
 /// The number of constants of a form in each span.
@@ -38,10 +54,20 @@ impl ChannelCurve {
     }
 
     /// Adds a span with its constants, as many as the form has.
-    pub(crate) fn push(&mut self, span: CrowdSpan, constants: &[[f32; 4]], key: Option<[f32; 4]>) {
+    pub(crate) fn push(&mut self, span: CrowdSpan, constants: &[[f32; 4]], key: Option<SpanKey>) {
         self.spans.push(span);
         self.constants.extend_from_slice(constants);
-        self.keys.push(key.unwrap_or_default());
+        self.keys.push(key.map_or([0.0; 4], |key| key.value));
+        self.key_indices.push(key.map_or(NONE, |key| key.index));
+    }
+
+    /// The most cells that its constants and keys take in the tables. A compact cubic has a key in a row, and parts of the
+    /// row's weights and sources; the others are in the rows for further channels.
+    pub(crate) fn cell_bound(&self) -> usize {
+        match self.form {
+            FORM_CUBIC_KEYS => 3 * self.constants.len() + POWERS * self.segments.len(),
+            _ => self.constants.len() + self.keys.len(),
+        }
     }
 
     /// The constants of a span.

@@ -6,14 +6,15 @@
 use glam::Vec4;
 
 use crate::crowd::channel_curve::{ChannelCurve, arcs_between};
-use crate::math::canonical::{canonical, round_f32};
+use crate::math::canonical::canonical;
 use crate::math::quaternion::{dot, unit};
 use crate::shader::{
-    CrowdChannel, CrowdSpan, FORM_ARC, FORM_CUBIC, FORM_KEYS, FORM_LINE, FORM_PACKED, ON_KEY,
-    PACKED_STEP,
+    CrowdChannel, CrowdSpan, FORM_ARC, FORM_ARC_KEYS, FORM_CUBIC, FORM_CUBIC_KEYS, FORM_KEYS,
+    FORM_LINE, FORM_PACKED, ON_KEY, PACKED_STEP,
 };
 use crate::simd::lanes::Lanes;
 use crate::twin::arc_between::arc_between;
+use crate::twin::crowd_compact::line_between;
 use crate::twin::functions::cubic;
 
 /// The largest magnitude of the three smaller components of a quaternion.
@@ -39,7 +40,10 @@ pub enum KeyPrecision {
 /// Whether a form consists of keys.
 #[inline(always)]
 pub(crate) fn keeps_keys(form: u32) -> bool {
-    matches!(form, FORM_KEYS | FORM_PACKED | FORM_LINE)
+    matches!(
+        form,
+        FORM_KEYS | FORM_PACKED | FORM_LINE | FORM_ARC_KEYS | FORM_CUBIC_KEYS
+    )
 }
 
 /// The form of a curve's keys and the keys, if these determine its constants.
@@ -128,16 +132,6 @@ fn keys_of_lines(curve: &ChannelCurve) -> Option<(u32, Vec<[f32; 4]>)> {
 #[inline(always)]
 fn next(index: usize, count: usize) -> usize {
     (index + 1).min(count - 1)
-}
-
-/// The middle of a line, and its rise.
-#[inline(always)]
-pub(crate) fn line_between(from: [f32; 4], to: [f32; 4]) -> [[f32; 4]; 2] {
-    let [from, to] = [from, to].map(|key| key.map(f64::from));
-    [
-        std::array::from_fn(|c| round_f32((from[c] + to[c]) * 0.5)),
-        std::array::from_fn(|c| round_f32(to[c] - from[c])),
-    ]
 }
 
 /// A rotation in 64 bits, the first two numbers of a cell: three components, which of the four is left out, and the

@@ -6,10 +6,12 @@ use std::ops::Range;
 use bytemuck::Zeroable as _;
 use glam::Vec3;
 
-use crate::crowd::channel_curve::{ChannelCurve, constants_of};
+use crate::crowd::channel_curve::{ChannelCurve, SpanKey, constants_of};
 use crate::crowd::clip_keys::{KeyPrecision, keeps_keys, keys_of, pack, pack_keys};
+use crate::crowd::compact::{CrowdStorage, add_cubics, compact_rotations, compact_vectors};
 use crate::crowd_error::{CrowdError, MAX_TICKS};
 use crate::curve::options::{KeySigns, Quantity, Speed};
+use crate::machine::crowd::ChannelForms;
 use crate::math::canonical::round_f32;
 use crate::memory::reserved;
 use crate::method::interpolation::Interpolation;
@@ -20,9 +22,9 @@ use crate::prepare::preparation::Batch;
 use crate::prepare::prepared::Prepared;
 use crate::prepare::vectors::VectorRequest;
 use crate::shader::{
-    CHANNELS, CrowdBase, CrowdChannel, CrowdClip, CrowdSpan, END_NEGATED, FORM_ARC, FORM_CONSTANT,
-    FORM_CUBIC, FORM_KEYS, FORM_PACKED, FORM_POLYNOMIAL, Form, KEY_OF_INTERVAL, ON_KEY, POWERS,
-    SCALE, START_NEGATED,
+    CHANNELS, CrowdBase, CrowdChannel, CrowdClip, CrowdPosition, CrowdSpan, END_NEGATED, FORM_ARC,
+    FORM_CONSTANT, FORM_CUBIC, FORM_CUBIC_KEYS, FORM_KEYS, FORM_PACKED, FORM_POLYNOMIAL, Form,
+    KEY_OF_INTERVAL, ON_KEY, POWERS, SCALE, START_NEGATED,
 };
 use crate::simd::lanes::{Lanes, MAX_LANES, canonical};
 use crate::time::frame_clock::{FrameClock, FrameStart, TrackCopy, in_frames};
@@ -33,6 +35,7 @@ use crate::time::wrap::WrapMode;
 use crate::tracks::set::TrackSet;
 use crate::tracks::set::vectors::Channel;
 use crate::twin::arc_between::arc_between;
+use crate::twin::crowd_compact::{constants_of_keys, is_compact, whole_form};
 use crate::twin::crowd_layers::sampled;
 use crate::twin::crowd_times::position_at;
 use crate::twin::evaluate_arc::{norm_squared, on_arc};
@@ -53,9 +56,24 @@ pub(crate) struct ClipTables {
     /// Ranges of consecutive joints whose rotations have one form and one time base and are adjacent in memory,
     /// `runs[clip]`.
     pub(crate) runs: Vec<Vec<Range<u32>>>,
-    /// Whether the curves of clips keep their keys where these are enough; `None`: constants alone, as the kernels of
-    /// crowds read them.
-    pub(crate) keys: Option<KeyPrecision>,
+    pub(crate) storage: ClipStorage,
+    /// The keys of the rotations, translations and scales of all clips.
+    pub(crate) key_count: usize,
+}
+
+/// How the curves of clips are stored.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum ClipStorage {
+    /// For crowds.
+    Crowd(CrowdStorage),
+    /// For motion tables, whose kernels read other keys: those of arcs and lines, where they are enough.
+    Motion(KeyPrecision),
+}
+
+impl Default for ClipStorage {
+    fn default() -> Self {
+        Self::Crowd(CrowdStorage::Segments)
+    }
 }
 
 /// The source of a span's values.
@@ -73,7 +91,7 @@ fn each_span<'d>(
     data: &'d ClipData,
     track: usize,
     (rate, start, period): (FrameRate, FrameStart, u32),
-    mut push: impl FnMut(CrowdSpan, SpanValues<'d>, Option<[f32; 4]>),
+    mut push: impl FnMut(CrowdSpan, SpanValues<'d>, Option<SpanKey>),
 ) -> Result<(), CrowdError> {
     let whole = TrackCopy::of_track(0..0);
     let last_tick = f64::from(period);
@@ -88,19 +106,26 @@ fn each_span<'d>(
             push(still(0), SpanValues::Constant(constant(part.before)), None);
             is_first = false;
         }
+        let mut key_index = part.first_key;
         let ends = starts.iter().skip(1).chain([&part.end]);
         let mut from = begin;
         for (index, &end) in part.spans.clone().zip(ends) {
             let start = from;
             let to = frames.boundary(end);
             from = to;
+            let key = prepared.spans.keys[index];
+            // An interval that was cut has several spans, of which the first has its key.
+            let number = key_index;
+            key_index += u32::from(key != NONE);
             if start.first >= to.first || start.first > last_tick {
                 continue; // no tick lies in it
             }
             let first = start.first as u32;
-            let key = prepared.spans.keys[index];
             let is_on_key = key != NONE && start.first == start.frame;
-            let key = (key != NONE).then(|| constant(key));
+            let key = (key != NONE).then(|| SpanKey {
+                value: constant(key),
+                index: number,
+            });
             let (span, values) = match prepared.spans.source(index) {
                 SpanSource::Segment(index) => {
                     let along = in_frames(start.frame, to.frame, 1.0);
@@ -133,7 +158,11 @@ fn each_span<'d>(
             let span = still(if is_first { 0 } else { first });
             let is_on_key = key.is_some() && end.first == end.frame;
             let value = SpanValues::Constant(constant(part.after));
-            push(marked(span, is_on_key), value, key.map(constant));
+            let span_key = SpanKey {
+                value: key.map_or([0.0; 4], constant),
+                index: key_index,
+            };
+            push(marked(span, is_on_key), value, Some(span_key));
             is_first = false;
         }
     }
@@ -230,7 +259,7 @@ fn curve_of_keys(
     each_span(data, 0, clock, |span, values, key| {
         let value = match values {
             SpanValues::Constant(value) if span.start & ON_KEY == 0 => value,
-            _ => key.unwrap_or_default(),
+            _ => key.map_or([0.0; 4], |key| key.value),
         };
         let is_same =
             |key: [f32; 4], other: [f32; 4]| key.map(f32::to_bits) == other.map(f32::to_bits);
@@ -278,7 +307,7 @@ fn keys_at_same_times(
         form: FORM_KEYS,
         spans: curve.spans.clone(),
         constants: keys.to_vec(),
-        keys: Vec::new(),
+        ..ChannelCurve::default()
     })
 }
 
@@ -332,24 +361,32 @@ impl ClipTables {
             });
             curves.push(curve(&scales, joint, FORM_CUBIC, clock)?);
         }
-        if let Some(precision) = self.keys {
-            // Rotations have been stored as keys already.
-            let curves = curves.iter_mut().enumerate();
-            for (_, curve) in curves.filter(|(index, _)| index % CHANNELS as usize != 0) {
-                if let Some((form, keys)) = keys_of(curve, precision) {
-                    (curve.form, curve.constants) = (form, keys);
+        match self.storage {
+            ClipStorage::Crowd(CrowdStorage::Segments) => {}
+            ClipStorage::Crowd(CrowdStorage::Compact) => compact(&mut curves, set, &interpolation),
+            ClipStorage::Motion(precision) => {
+                // Rotations have been stored as keys already.
+                let curves = curves.iter_mut().enumerate();
+                for (_, curve) in curves.filter(|(index, _)| index % CHANNELS as usize != 0) {
+                    if let Some((form, keys)) = keys_of(curve, precision) {
+                        (curve.form, curve.constants) = (form, keys);
+                    }
                 }
             }
         }
         // Every curve has constants and keys; it may also have its own spans.
-        let constants = |curve: &ChannelCurve| curve.constants.len() + curve.keys.len();
-        let more: usize = curves.iter().map(constants).sum();
+        let more: usize = curves.iter().map(ChannelCurve::cell_bound).sum();
         let spans: usize = curves.iter().map(|curve| curve.spans.len()).sum();
         if curves.len() >= 1 << 24 {
             return Err(CrowdError::TooLarge);
         }
         self.check_room([more, spans + 1, curves.len()])?;
         self.add(period, &curves);
+        let of_vectors = [Channel::Translation, Channel::Scale].map(|channel| {
+            let tracks = (0..joints).filter_map(|joint| set.vectors(channel, joint));
+            tracks.map(|track| track.keys.len()).sum::<usize>()
+        });
+        self.key_count += set.key_count() + of_vectors.iter().sum::<usize>();
         Ok(())
     }
 
@@ -366,11 +403,15 @@ impl ClipTables {
         let are_from_keys = form == FORM_ARC
             && interpolation.signs == KeySigns::Shortest
             && interpolation.speed == Speed::AsKeyed;
-        let Some(precision) = self.keys.filter(|_| are_from_keys) else {
+        let precision = match self.storage {
+            ClipStorage::Motion(precision) => Some(precision),
+            ClipStorage::Crowd(_) => None,
+        };
+        let Some(precision) = precision.filter(|_| are_from_keys) else {
             let data = ClipData::new(set, interpolation, PrepareRequest::all(set))?;
             let curves = joints.map(|joint| {
                 let curve = curve(&data, joint, form, clock)?;
-                Ok(match self.keys {
+                Ok(match precision {
                     Some(precision) => of_keys(curve, precision),
                     None => curve,
                 })
@@ -446,6 +487,7 @@ impl ClipTables {
                 ..clip
             }));
         self.runs.extend(other.runs);
+        self.key_count += other.key_count;
         Ok(())
     }
 
@@ -459,6 +501,8 @@ impl ClipTables {
         let mut last: Option<(&[CrowdSpan], u32)> = None;
         // Channels with the same kind, form and time base are stored next to each other.
         let mut sides = BTreeMap::<_, Vec<(usize, &ChannelCurve)>>::new();
+        // Compact cubics share a list of weights, too.
+        let mut lists: Vec<&[[f32; 4]]> = Vec::new();
         for (index, curve) in curves.iter().enumerate() {
             let mut base = 0;
             if curve.form != FORM_CONSTANT {
@@ -473,7 +517,12 @@ impl ClipTables {
                 };
                 last = Some((&curve.spans, base));
             }
-            let side = (index as u32 % CHANNELS, curve.form, base);
+            let is_same = |list: &&[[f32; 4]]| bytes_of(list) == bytes_of(curve.weights.as_slice());
+            let list = lists.iter().position(is_same).unwrap_or_else(|| {
+                lists.push(&curve.weights);
+                lists.len() - 1
+            });
+            let side = (index as u32 % CHANNELS, curve.form, base, list);
             sides.entry(side).or_default().push((index, curve));
         }
         if self.bases.len() == first_base {
@@ -483,7 +532,20 @@ impl ClipTables {
         let first_channel = self.channels.len();
         let none = CrowdChannel::zeroed();
         self.channels.resize(first_channel + curves.len(), none);
-        for ((_, form, base), members) in sides {
+        for ((_, form, base, _), members) in sides {
+            if form == FORM_CUBIC_KEYS {
+                let [first, group] = add_cubics(&mut self.cells, &members);
+                let count = members.len() as u32;
+                for (slot, (index, _)) in members.into_iter().enumerate() {
+                    self.channels[first_channel + index] = CrowdChannel {
+                        first: (first + slot) as u32,
+                        count,
+                        form_and_base: form << 24 | base,
+                        keys: group as u32,
+                    };
+                }
+                continue;
+            }
             let mut lay_out = |column: fn(&ChannelCurve) -> &[[f32; 4]]| {
                 let first = self.cells.len();
                 for row in 0..column(members[0].1).len() {
@@ -534,11 +596,84 @@ impl ClipTables {
         self.spans.extend_from_slice(spans);
     }
 
-    /// Whether all rotations are arcs or constants.
-    pub(crate) fn has_only_arcs(&self) -> bool {
-        let rotations = self.channels.iter().step_by(CHANNELS as usize);
-        let mut forms = rotations.map(|channel| channel.form_and_base >> 24);
-        forms.all(|form| form == FORM_ARC || form == FORM_CONSTANT)
+    /// The forms of the channels.
+    pub(crate) fn forms(&self) -> ChannelForms {
+        let form = |channel: &CrowdChannel| channel.form_and_base >> 24;
+        let mut rotations = self.channels.iter().step_by(CHANNELS as usize).map(form);
+        if self.channels.iter().map(form).any(is_compact) {
+            ChannelForms::Compact
+        } else if rotations.all(|form| form == FORM_ARC || form == FORM_CONSTANT) {
+            ChannelForms::Arcs
+        } else {
+            ChannelForms::Segments
+        }
+    }
+
+    /// Bytes of the tables.
+    pub(crate) fn bytes(&self) -> usize {
+        size_of_val(&*self.clips)
+            + size_of_val(&*self.bases)
+            + size_of_val(&*self.spans)
+            + size_of_val(&*self.channels)
+            + size_of_val(&*self.cells)
+    }
+
+    /// The same clips without compact forms.
+    pub(crate) fn with_segments(self) -> Self {
+        if self.forms() != ChannelForms::Compact {
+            return self;
+        }
+        let mut whole = Self {
+            key_count: self.key_count,
+            ..Self::default()
+        };
+        let each = self.channels.len() / self.clips.len().max(1);
+        for (clip, channels) in self.clips.iter().zip(self.channels.chunks(each.max(1))) {
+            let bases = &self.bases[clip.first_base as usize..];
+            let curves = channels.iter().map(|channel| {
+                let base = &bases[(channel.form_and_base & 0x00ff_ffff) as usize];
+                let spans = &self.spans[base.first as usize..][..base.count as usize];
+                self.curve_of(channel, spans)
+            });
+            whole.add(clip.period, &curves.collect::<Vec<_>>());
+        }
+        whole
+    }
+
+    /// The curve of a channel with these spans, as it was before it was stored.
+    fn curve_of(&self, channel: &CrowdChannel, spans: &[CrowdSpan]) -> ChannelCurve {
+        let form = channel.form_and_base >> 24;
+        let (first, count) = (channel.first as usize, channel.count as usize);
+        if form == FORM_CONSTANT {
+            return ChannelCurve::constant(self.cells[first]);
+        }
+        let has_keys = spans.iter().any(|span| span.start & ON_KEY != 0);
+        let mut curve = ChannelCurve {
+            form: whole_form(form),
+            spans: spans.to_vec(),
+            ..ChannelCurve::default()
+        };
+        for row in 0..spans.len() {
+            let on_key = CrowdPosition {
+                span: row as u32 | ON_KEY,
+                parameter: 0.0,
+            };
+            let key = match has_keys {
+                true => sampled(&self.cells, channel, on_key),
+                false => [0.0; 4],
+            };
+            curve.keys.push(key);
+            if is_compact(form) {
+                curve
+                    .constants
+                    .extend(constants_of_keys(&self.cells, channel, row));
+                continue;
+            }
+            let powers = constants_of(form);
+            let cells = (0..powers).map(|power| first + (row * powers + power) * count);
+            curve.constants.extend(cells.map(|cell| self.cells[cell]));
+        }
+        curve
     }
 
     /// Every channel of a clip at a tick, `[joint][kind]`, in the form of reference poses: scales are stored as their
@@ -569,6 +704,25 @@ impl ClipTables {
             }
         })
     }
+}
+
+/// Stores curves as their keys where these determine them.
+fn compact(curves: &mut [ChannelCurve], set: &TrackSet, interpolation: &Interpolation) {
+    let (joints, _) = curves.as_chunks_mut::<{ CHANNELS as usize }>();
+    let mut rotations: Vec<_> = joints.iter_mut().map(|[rotation, ..]| rotation).collect();
+    compact_rotations(&mut rotations, set, interpolation);
+    for (joint, [_, moved, scale]) in joints.iter_mut().enumerate() {
+        for (curve, channel) in [(moved, Channel::Translation), (scale, Channel::Scale)] {
+            let keys = set.vectors(channel, joint).map(|track| &*track.keys);
+            if let Some(last) = keys.and_then(<[Vec3]>::last) {
+                compact_vectors(curve, [last.x, last.y, last.z, 0.0]);
+            }
+        }
+    }
+}
+
+fn bytes_of(list: &[[f32; 4]]) -> &[u8] {
+    bytemuck::cast_slice(list)
 }
 
 /// The runs of rotations among the channels of a clip.

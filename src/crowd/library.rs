@@ -7,7 +7,8 @@ use glam::{Affine3A, Vec3};
 use rayon::prelude::*;
 
 use crate::crowd::clip_keys::KeyPrecision;
-use crate::crowd::clip_tables::{ClipTables, MAX_ENTRIES};
+use crate::crowd::clip_tables::{ClipStorage, ClipTables, MAX_ENTRIES};
+use crate::crowd::compact::CrowdStorage;
 use crate::crowd::events::ClipEvent;
 use crate::crowd::stages;
 use crate::crowd::states::MotionTables;
@@ -132,6 +133,45 @@ impl CrowdLibrary {
         })
     }
 
+    /// Sets how clips are stored that are added from now on. Poses have the same bits; compact clips take less memory and
+    /// more time.
+    ///
+    /// ```
+    /// # use tumble::glam::{Quat, Vec3};
+    /// # use tumble::crowd::{CrowdLibrary, CrowdStorage};
+    /// # use tumble::{Skeleton, TrackSet, VectorMethod, method};
+    /// let mut spin = TrackSet::new();
+    /// let times: Vec<f64> = (0..300).map(|key| f64::from(key) / 30.0).collect();
+    /// let keys: Vec<Quat> = times.iter().map(|time| Quat::from_rotation_y(*time as f32)).collect();
+    /// spin.push("hip", &times, &keys)?;
+    /// let skeleton = Skeleton::new(vec![None], vec![Vec3::ZERO])?;
+    /// let mut library = CrowdLibrary::new(&skeleton)?;
+    /// library.set_storage(CrowdStorage::Compact);
+    /// library.push(&spin, method::BESSEL_OVERHAUSER, VectorMethod::Linear)?;
+    /// assert!(library.bytes_per_key() < 60.0); // 16 for the times, which other joints share
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn set_storage(&mut self, storage: CrowdStorage) {
+        self.tables.storage = ClipStorage::Crowd(storage);
+    }
+
+    /// How clips are stored that are added next.
+    #[must_use]
+    pub fn storage(&self) -> CrowdStorage {
+        match self.tables.storage {
+            ClipStorage::Crowd(storage) => storage,
+            ClipStorage::Motion(_) => CrowdStorage::Segments,
+        }
+    }
+
+    /// Bytes of the clips divided by the number of their keys (of rotations, translations and scales), on the CPU and on
+    /// devices: curves, times and reference poses.
+    #[must_use]
+    pub fn bytes_per_key(&self) -> f64 {
+        let bytes = self.tables.bytes() + size_of_val(&*self.references);
+        bytes as f64 / self.tables.key_count.max(1) as f64
+    }
+
     /// Number of ticks in a second.
     #[must_use]
     pub fn ticks_per_second(&self) -> u32 {
@@ -208,7 +248,7 @@ impl CrowdLibrary {
     fn clone_without_tables(&self) -> Self {
         Self {
             tables: ClipTables {
-                keys: self.tables.keys,
+                storage: self.tables.storage,
                 ..ClipTables::default()
             },
             offsets: self.offsets.clone(),
@@ -457,7 +497,8 @@ impl CrowdLibrary {
     #[must_use]
     pub fn into_tables(self) -> (MotionTables, Vec<[u32; 4]>, Vec<[f32; 4]>) {
         let (ticks_per_second, joints) = (self.ticks_per_second(), self.joint_count());
-        MotionTables::of_library(self.tables, self.links, joints, ticks_per_second)
+        let tables = self.tables.with_segments();
+        MotionTables::of_library(tables, self.links, joints, ticks_per_second)
     }
 }
 
@@ -506,7 +547,7 @@ impl MotionBuilder {
         precision: KeyPrecision,
     ) -> Result<Self, CrowdError> {
         let mut library = CrowdLibrary::with_ticks(skeleton, ticks_per_second)?;
-        library.tables.keys = Some(precision);
+        library.tables.storage = ClipStorage::Motion(precision);
         Ok(Self(library))
     }
 

@@ -7,7 +7,7 @@
 //!
 //! # Types
 //!
-//! * [`CrowdLibrary`]: the clips of a skeleton, its masks and reference poses.
+//! * [`CrowdLibrary`]: the clips of a skeleton, its masks and reference poses. [`CrowdStorage`] says how it stores clips.
 //! * [`Crowd`]: instances with up to four [`CrowdLayer`]s each, and the clock.
 //!   [`Engine::crowd`](crate::Engine::crowd) makes one.
 //! * [`CrowdFade`]: a layer's weight as a function of the clock.
@@ -40,14 +40,15 @@
 // runs the kernels, `on_cpu` their twins.
 //
 // Cells of channels with one form and one time base lie side by side, constant by constant, so that neighbouring
-// joints are neighbouring lanes. Motion tables keep the keys of arcs and lines instead (`clip_keys`). On a device the
-// tables stay; entries that changed are written with the next
+// joints are neighbouring lanes. Motion tables keep the keys of arcs and lines instead (`clip_keys`), and crowds those of
+// cubics too if this is requested (`compact`). On a device the tables stay; entries that changed are written with the next
 // evaluation; positions live for a window alone.
 
 pub(crate) mod body_states;
 pub(crate) mod channel_curve;
 pub(crate) mod clip_keys;
 pub(crate) mod clip_tables;
+pub(crate) mod compact;
 #[cfg(feature = "vulkan")]
 pub(crate) mod device_bodies;
 #[cfg(feature = "vulkan")]
@@ -66,6 +67,7 @@ mod tree_walk;
 
 pub use crate::crowd::body_states::{BodyStates, BodyTables};
 pub use crate::crowd::clip_keys::KeyPrecision;
+pub use crate::crowd::compact::CrowdStorage;
 #[cfg(feature = "vulkan")]
 pub use crate::crowd::device_bodies::DeviceBodies;
 #[cfg(feature = "vulkan")]

@@ -4,6 +4,7 @@ use bytemuck::Zeroable as _;
 use rayon::prelude::*;
 
 use crate::crowd::clip_tables::{ClipTables, arcs};
+use crate::crowd::compact;
 use crate::crowd::lay_over::lay_over;
 use crate::crowd::library::CrowdLibrary;
 use crate::crowd::stages;
@@ -15,6 +16,7 @@ use crate::shader::{
 use crate::simd::dispatch::{InLanes, in_lanes_of};
 use crate::simd::lanes::Lanes;
 use crate::threads::OutOfThreadsError;
+use crate::twin::crowd_compact::is_compact;
 use crate::twin::crowd_layers::Layers;
 use crate::twin::crowd_matrices::transform;
 use crate::twin::crowd_times::base_positions;
@@ -191,6 +193,10 @@ fn of_layer<L: Lanes>(
             let tangent = middle + channel.count as usize;
             let cells = |first: usize| &context.cells[first..first + values.len()];
             arcs::<L>(cells(middle), cells(tangent), stands.parameter, values);
+            continue;
+        }
+        if is_compact(channel.form_and_base >> 24) {
+            compact::rotations::<L>(context.cells, channel, stands, values);
             continue;
         }
         for (joint, value) in run.clone().zip(values) {

@@ -63,7 +63,7 @@ impl InLanes for CubicBlock {
 /// The rotation at a parameter of a curve of small angles, as `polynomial` gives it, whose powers above the sixth are
 /// 0; [`UNRESOLVED`](crate::from_keys::UNRESOLVED) if the curve turns too far.
 #[inline(always)]
-pub(super) fn sample<L: Lanes>(curve: &SmallAngleCubic<L>, s: L) -> [L; 4] {
+pub(crate) fn sample<L: Lanes>(curve: &SmallAngleCubic<L>, s: L) -> [L; 4] {
     let c = &curve.powers;
     let z = s * s;
     let zz = z * z;

@@ -244,7 +244,7 @@ impl<L: Lanes> KeysOf<Together<L, 2>> for [TracksInLanes; 2] {
 
 /// The same weights in all lanes.
 #[inline(always)]
-fn alike<L: Lanes>(weights: TangentWeights) -> [L; 4] {
+pub(crate) fn alike<L: Lanes>(weights: TangentWeights) -> [L; 4] {
     let TangentWeights {
         before,
         after,

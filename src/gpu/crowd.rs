@@ -74,7 +74,7 @@ impl CrowdTables {
             instances: source.instances,
             shape: CrowdShape {
                 levels: source.levels.to_vec(),
-                only_arcs: source.only_arcs,
+                forms: source.forms,
                 arguments: source.arguments,
             },
             clips: table("tumble crowd clips", cast_slice(source.clips))?,

@@ -22,10 +22,41 @@ pub(crate) struct CrowdSource<'a> {
     pub(crate) levels: &'a [u32],
     /// The rows of inverse bind matrices; empty if there are none.
     pub(crate) bind: &'a [[[f32; 4]; 3]],
-    /// Whether all rotations are arcs or constants.
-    pub(crate) only_arcs: bool,
+    pub(crate) forms: ChannelForms,
     /// The push constants that all dispatches share.
     pub(crate) arguments: CrowdDispatch,
+}
+
+/// The forms of a library's channels, as far as they choose the kernels of a crowd.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum ChannelForms {
+    /// All rotations are arcs or constants.
+    Arcs,
+    /// Any segments.
+    Segments,
+    /// Some channels are stored compactly.
+    Compact,
+}
+
+/// The curves of a crowd's channels, of which each kind has kernels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum CrowdCurves {
+    /// Instances have one layer, and all rotations are arcs.
+    Plain,
+    /// Any segments.
+    Any,
+    /// Some are stored compactly.
+    Compact,
+}
+
+impl CrowdCurves {
+    pub(crate) fn new(forms: ChannelForms, layers: u32) -> Self {
+        match forms {
+            ChannelForms::Arcs if layers == 1 => Self::Plain,
+            ChannelForms::Arcs | ChannelForms::Segments => Self::Any,
+            ChannelForms::Compact => Self::Compact,
+        }
+    }
 }
 
 /// The changes that a device needs for an evaluation.

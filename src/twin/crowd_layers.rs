@@ -8,9 +8,10 @@ use glam::Vec4;
 use crate::math::canonical::canonical;
 use crate::shader::{
     ArcSegment, CHANNELS, CrowdChannel, CrowdEntry, CrowdPosition, FORM_ARC, FORM_CONSTANT,
-    FORM_CUBIC, ON_KEY, POWERS, PolynomialSegment, TICKS, WEIGHT_UNIT,
+    FORM_CUBIC, FORM_POLYNOMIAL, ON_KEY, POWERS, PolynomialSegment, TICKS, WEIGHT_UNIT,
 };
 use crate::twin::Evaluate as _;
+use crate::twin::crowd_compact::value_of_keys;
 pub(crate) use crate::twin::functions::{cubic, laid_over};
 
 /// The buffers that the kernels over layers read. Entries and positions are those of a window of instances.
@@ -44,6 +45,9 @@ pub(crate) fn sampled(
     let cell = |index: u32| cells[index as usize];
     if form == FORM_CONSTANT {
         return cell(channel.first);
+    }
+    if form > FORM_POLYNOMIAL {
+        return value_of_keys(cells, channel, position);
     }
     if position.span & ON_KEY != 0 {
         return cell(channel.keys + span * count);

@@ -1,4 +1,4 @@
-//! Twin of `shaders/forms/evaluate_arc.wgsl`: the same names, the same order.
+//! Twin of `shaders/forms/evaluate_arc.wgsl` and `shaders/math/norm_squared.wgsl`: the same names, the same order.
 
 use glam::Vec4;
 

@@ -5,6 +5,7 @@
 pub(crate) mod arc_between;
 pub(crate) mod arc_tangent;
 pub(crate) mod axis_angle;
+pub(crate) mod crowd_compact;
 pub(crate) mod crowd_entries;
 pub(crate) mod crowd_layers;
 pub(crate) mod crowd_matrices;

@@ -1,6 +1,8 @@
 //! The recording of a crowd's frames, whose steps and their order are those of [`FrameStep`].
 
-use crate::machine::crowd::{CrowdFrame, EntryChanges, VisibleInstances};
+use crate::machine::crowd::{
+    ChannelForms, CrowdCurves, CrowdFrame, EntryChanges, VisibleInstances,
+};
 use crate::output::crowd::{CrowdOutput, CrowdStage, FrameStep};
 use crate::shader::{
     CROWD_WORKGROUP, CrowdDispatch, CrowdEntry, CrowdPosition, Kernel, MAX_WALKED, WORKGROUP,
@@ -14,27 +16,29 @@ use crate::work::whole_instances::WholeInstances;
 pub(crate) struct CrowdShape {
     /// The first link of each level of the skeleton below the roots, then the number of links.
     pub(crate) levels: Vec<u32>,
-    /// Whether all rotations are arcs or constants.
-    pub(crate) only_arcs: bool,
+    pub(crate) forms: ChannelForms,
     /// The push constants that all dispatches share.
     pub(crate) arguments: CrowdDispatch,
 }
 
 impl CrowdShape {
-    /// Whether there is only one layer, and it has only arcs.
-    fn is_plain(&self) -> bool {
-        self.arguments.layers == 1 && self.only_arcs
+    /// Which kernels evaluate the channels.
+    fn curves(&self) -> CrowdCurves {
+        CrowdCurves::new(self.forms, self.arguments.layers)
     }
 
     /// The kernel of a step that is taken by itself.
     fn kernel(&self, step: FrameStep, device: &CrowdDevice<'_>) -> Kernel {
         let walks_at_once = device.maps_samples && self.arguments.joints <= MAX_WALKED;
-        match (step, self.is_plain()) {
+        use CrowdCurves::{Any, Compact, Plain};
+        match (step, self.curves()) {
             (FrameStep::Positions, _) => Kernel::CrowdTimes,
-            (FrameStep::Rotations, true) => Kernel::CrowdPlainRotations,
-            (FrameStep::Rotations, false) => Kernel::CrowdRotations,
-            (FrameStep::Locals, true) => Kernel::CrowdPlainLocals,
-            (FrameStep::Locals, false) => Kernel::CrowdLocals,
+            (FrameStep::Rotations, Plain) => Kernel::CrowdPlainRotations,
+            (FrameStep::Rotations, Any) => Kernel::CrowdRotations,
+            (FrameStep::Rotations, Compact) => Kernel::CrowdCompactRotations,
+            (FrameStep::Locals, Plain) => Kernel::CrowdPlainLocals,
+            (FrameStep::Locals, Any) => Kernel::CrowdLocals,
+            (FrameStep::Locals, Compact) => Kernel::CrowdCompactLocals,
             (FrameStep::Walk, _) if walks_at_once => Kernel::CrowdWalkAll,
             (FrameStep::Walk, _) => Kernel::CrowdWalk,
             (FrameStep::Skin, _) => Kernel::CrowdSkin,
@@ -82,13 +86,13 @@ impl WholeKernel {
     fn new(
         arguments: &CrowdDispatch,
         output: CrowdOutput,
-        is_plain: bool,
+        curves: CrowdCurves,
         device: &CrowdDevice<'_>,
     ) -> Option<Self> {
         let by_subgroups = device.subgroup_lanes.and_then(|lanes| {
-            SubgroupInstances::new(arguments, output, is_plain, lanes).map(Self::Subgroups)
+            SubgroupInstances::new(arguments, output, curves, lanes).map(Self::Subgroups)
         });
-        let by_workgroups = WholeInstances::new(arguments, output, is_plain).map(Self::Workgroups);
+        let by_workgroups = WholeInstances::new(arguments, output, curves).map(Self::Workgroups);
         let runs = |whole: &Self| device.maps_samples && (device.runs)(whole.kernel());
         by_subgroups.filter(runs).or(by_workgroups.filter(runs))
     }
@@ -112,8 +116,7 @@ pub(crate) struct FrameKernels {
 
 impl FrameKernels {
     pub(crate) fn new(shape: &CrowdShape, output: CrowdOutput, device: &CrowdDevice<'_>) -> Self {
-        let is_plain = shape.is_plain();
-        let whole = WholeKernel::new(&shape.arguments, output, is_plain, device);
+        let whole = WholeKernel::new(&shape.arguments, output, shape.curves(), device);
         let of_step = |step| shape.kernel(step, device);
         Self {
             output,
@@ -482,13 +485,17 @@ impl CrowdResources {
             Kernel::CrowdHalf => (&[], &[values, output]),
             Kernel::CrowdRotations
             | Kernel::CrowdPlainRotations
+            | Kernel::CrowdCompactRotations
             | Kernel::CrowdLocals
-            | Kernel::CrowdPlainLocals => (&[entries, channels, cells, positions], &[values]),
+            | Kernel::CrowdPlainLocals
+            | Kernel::CrowdCompactLocals => (&[entries, channels, cells, positions], &[values]),
             Kernel::CrowdSubgroupRotations | Kernel::CrowdSubgroupRotationsF16 => {
                 (&[entries, clips, bases, spans, channels, cells], &[output])
             }
             // Over whole instances: the result is bound in both precisions.
-            Kernel::CrowdWholeRotations | Kernel::CrowdPlainWholeRotations => (
+            Kernel::CrowdWholeRotations
+            | Kernel::CrowdPlainWholeRotations
+            | Kernel::CrowdCompactWholeRotations => (
                 &[entries, clips, bases, spans, channels, cells],
                 &[output; 2],
             ),
@@ -515,7 +522,7 @@ mod tests {
     fn shape() -> CrowdShape {
         CrowdShape {
             levels: vec![0, 1, 1, 2],
-            only_arcs: true,
+            forms: ChannelForms::Arcs,
             arguments: CrowdDispatch {
                 joints: 3,
                 layers: 1,

@@ -1,6 +1,7 @@
 //! Instances that a card's subgroups evaluate as wholes: as [`WholeInstances`](super::whole_instances::WholeInstances),
 //! with neither memory of a workgroup nor barriers (`shaders/crowd/subgroup_rotations.wgsl`).
 
+use crate::machine::crowd::CrowdCurves;
 use crate::output::crowd::{CrowdOutput, CrowdValues};
 use crate::shader::{
     CROWD_WORKGROUP, CrowdDispatch, CrowdSubgroupDispatch, Kernel, LINE_VECTORS,
@@ -25,7 +26,7 @@ impl SubgroupInstances {
     pub(crate) fn new(
         arguments: &CrowdDispatch,
         output: CrowdOutput,
-        is_plain: bool,
+        curves: CrowdCurves,
         lanes: u32,
     ) -> Option<Self> {
         let CrowdDispatch { joints, bases, .. } = *arguments;
@@ -37,6 +38,7 @@ impl SubgroupInstances {
         };
         let largest = MAX_SUBGROUP_POSITIONS.ilog2();
         let instances_log2 = (0..=largest).rev().find(fits)?;
+        let is_plain = curves == CrowdCurves::Plain;
         (is_plain && output.values == CrowdValues::Rotations).then_some(Self {
             instances_log2,
             lanes,
@@ -97,7 +99,12 @@ mod tests {
     fn subgroups_take_as_many_instances_as_there_is_room_for() {
         let rotations = CrowdOutput::from(CrowdValues::Rotations);
         let instances = |joints, bases| {
-            let found = SubgroupInstances::new(&arguments(joints, bases), rotations, true, 32);
+            let found = SubgroupInstances::new(
+                &arguments(joints, bases),
+                rotations,
+                CrowdCurves::Plain,
+                32,
+            );
             found.map(|found| 1 << found.instances_log2)
         };
         assert_eq!(instances(60, 1), Some(4));
@@ -112,17 +119,19 @@ mod tests {
         assert_eq!(instances(1032, 1), None);
         // In half precision, a line has twice as many values.
         let half = CrowdOutput::half(CrowdValues::Rotations);
-        let of_half = |joints| SubgroupInstances::new(&arguments(joints, 1), half, true, 32);
+        let of_half =
+            |joints| SubgroupInstances::new(&arguments(joints, 1), half, CrowdCurves::Plain, 32);
         assert_eq!(of_half(60).map(|found| found.instances_log2), Some(2));
         assert_eq!(of_half(2), None);
     }
 
     #[test]
     fn other_outputs_have_other_kernels() {
-        let of = |output, is_plain| SubgroupInstances::new(&arguments(60, 1), output, is_plain, 32);
+        use CrowdCurves::{Any, Compact, Plain};
+        let of = |output, curves| SubgroupInstances::new(&arguments(60, 1), output, curves, 32);
         let rotations = CrowdOutput::from(CrowdValues::Rotations);
         let half = CrowdOutput::half(CrowdValues::Rotations);
-        let kernel = |output| of(output, true).map(|found| found.kernel() as usize);
+        let kernel = |output| of(output, Plain).map(|found| found.kernel() as usize);
         assert_eq!(
             kernel(rotations),
             Some(Kernel::CrowdSubgroupRotations as usize)
@@ -131,8 +140,10 @@ mod tests {
             kernel(half),
             Some(Kernel::CrowdSubgroupRotationsF16 as usize)
         );
-        assert!(of(rotations, false).is_none() && of(half, false).is_none());
-        assert_eq!(of(CrowdValues::Local.into(), true), None);
+        for curves in [Any, Compact] {
+            assert!(of(rotations, curves).is_none() && of(half, curves).is_none());
+        }
+        assert_eq!(of(CrowdValues::Local.into(), Plain), None);
     }
 
     /// Every joint of a subgroup finds its instance by a product.
@@ -141,7 +152,8 @@ mod tests {
         let rotations = CrowdOutput::from(CrowdValues::Rotations);
         for joints in 1..=MAX_SUBGROUP_JOINTS {
             let arguments = arguments(joints, 1);
-            let Some(found) = SubgroupInstances::new(&arguments, rotations, true, 32) else {
+            let Some(found) = SubgroupInstances::new(&arguments, rotations, CrowdCurves::Plain, 32)
+            else {
                 continue;
             };
             let (pushed, groups) = found.dispatch(&arguments);

@@ -1,6 +1,7 @@
 //! Instances that a card evaluates as wholes: one kernel has all steps of a frame, and a workgroup of it takes a few
 //! instances, whose positions and matrices stay in its memory (`shaders/crowd/whole.wgsl`).
 
+use crate::machine::crowd::CrowdCurves;
 use crate::output::crowd::{CrowdOutput, CrowdValues};
 use crate::shader::{
     CROWD_WORKGROUP, CrowdDispatch, CrowdPosition, CrowdWholeDispatch, Kernel, LINE_VECTORS,
@@ -24,13 +25,13 @@ pub(crate) struct WholeInstances {
 }
 
 impl WholeInstances {
-    /// `None` where an instance is too large for a workgroup's memory. `is_plain` says that instances have one layer,
-    /// and that all rotations are arcs.
+    /// `None` where an instance is too large for a workgroup's memory.
     pub(crate) fn new(
         arguments: &CrowdDispatch,
         output: CrowdOutput,
-        is_plain: bool,
+        curves: CrowdCurves,
     ) -> Option<Self> {
+        use CrowdCurves::{Any, Compact, Plain};
         let CrowdDispatch {
             joints,
             layers,
@@ -54,11 +55,13 @@ impl WholeInstances {
             .filter(is_divided)
             .min_by(|&a, &b| (rounds(a) * b).cmp(&(rounds(b) * a)).then(b.cmp(&a)))?;
         Some(Self {
-            kernel: match (is_rotations, is_plain) {
-                (true, true) => Kernel::CrowdPlainWholeRotations,
-                (true, false) => Kernel::CrowdWholeRotations,
-                (false, true) => Kernel::CrowdPlainWholeMatrices,
-                (false, false) => Kernel::CrowdWholeMatrices,
+            kernel: match (is_rotations, curves) {
+                (true, Plain) => Kernel::CrowdPlainWholeRotations,
+                (true, Any) => Kernel::CrowdWholeRotations,
+                (true, Compact) => Kernel::CrowdCompactWholeRotations,
+                (false, Plain) => Kernel::CrowdPlainWholeMatrices,
+                (false, Any) => Kernel::CrowdWholeMatrices,
+                (false, Compact) => Kernel::CrowdCompactWholeMatrices,
             },
             output,
             instances,
@@ -117,7 +120,7 @@ mod tests {
             bases,
             ..CrowdDispatch::zeroed()
         };
-        let whole = WholeInstances::new(&arguments, output, false);
+        let whole = WholeInstances::new(&arguments, output, CrowdCurves::Any);
         whole.map(|whole| whole.instances)
     }
 

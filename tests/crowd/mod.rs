@@ -3,6 +3,7 @@
 
 mod application_device;
 mod bodies;
+mod compact;
 mod device_motions;
 mod fades;
 mod refusals;

@@ -3,7 +3,7 @@
 
 use std::fmt::Debug;
 
-use crate::crowd::clip_keys::{line_between, unpacked};
+use crate::crowd::clip_keys::unpacked;
 use crate::fit::constant_velocity::arc_component;
 use crate::gpu::kernel_check::random::Random;
 use crate::math::quaternion::{cross3, dot, dot3, product};
@@ -15,6 +15,7 @@ use crate::shader::{
 };
 use crate::twin::Evaluate as _;
 use crate::twin::arc_tangent::{arc_tangent, root};
+use crate::twin::crowd_compact::line_between;
 use crate::twin::entries;
 use crate::twin::functions::FromIdentity;
 use crate::twin::functions::slerp;

@@ -4,8 +4,10 @@
 use fastrand::Rng;
 use glam::{Affine3A, Vec3};
 
+use crate::crowd::compact::CrowdStorage;
 use crate::crowd::layer::CrowdLayer;
 use crate::crowd::library::CrowdLibrary;
+use crate::machine::crowd::CrowdCurves;
 use crate::method::Method;
 use crate::method::bessel_overhauser::BESSEL_OVERHAUSER;
 use crate::method::slerp::SLERP;
@@ -24,11 +26,12 @@ use super::lines::{CARDS, Count, walk};
 const INSTANCES: u32 = 50;
 
 /// Two clips of a skeleton.
-fn library(joints: usize, method: Method) -> CrowdLibrary {
+fn library(joints: usize, method: Method, storage: CrowdStorage) -> CrowdLibrary {
     let mut random = Rng::with_seed(5);
     let parents = (0..joints).map(|joint| joint.checked_sub(1).map(|before| before / 2));
     let skeleton = Skeleton::new(parents.collect(), vec![Vec3::ONE; joints]).unwrap();
     let mut library = CrowdLibrary::new(&skeleton).unwrap();
+    library.set_storage(storage);
     for keys in [20, 40] {
         let mut set = TrackSet::new();
         let times: Vec<f64> = (0..keys).map(|key| f64::from(key) * 0.1).collect();
@@ -60,15 +63,15 @@ fn assert_stores_whole_lines(
         clock_low: CLOCK as u32,
         ..library.arguments(layers)
     };
-    let is_plain = layers == 1 && library.tables.has_only_arcs();
+    let curves = CrowdCurves::new(library.tables.forms(), layers as u32);
     let (kernel, pushed, groups) = match subgroup_lanes {
         None => {
-            let whole = WholeInstances::new(&arguments, output, is_plain).expect("it is small");
+            let whole = WholeInstances::new(&arguments, output, curves).expect("it is small");
             let (pushed, groups) = whole.dispatch(arguments, &library.levels);
             (whole.kernel, bytemuck::bytes_of(&pushed).to_vec(), groups)
         }
         Some(lanes) => {
-            let whole = SubgroupInstances::new(&arguments, output, is_plain, lanes).unwrap();
+            let whole = SubgroupInstances::new(&arguments, output, curves, lanes).unwrap();
             let (pushed, groups) = whole.dispatch(&arguments);
             let pushed = bytemuck::bytes_of(&pushed).to_vec();
             (whole.kernel(), pushed, groups)
@@ -146,13 +149,14 @@ fn assert_stores_whole_lines(
 #[test]
 fn whole_instances_store_whole_lines() {
     let mut kernels = Vec::new();
-    for (joints, method, layers) in [
-        (60, SLERP, 1),
-        (21, SLERP, 1),
-        (60, BESSEL_OVERHAUSER, 2),
-        (21, BESSEL_OVERHAUSER, 2),
+    for (joints, method, layers, storage) in [
+        (60, SLERP, 1, CrowdStorage::Segments),
+        (21, SLERP, 1, CrowdStorage::Segments),
+        (60, BESSEL_OVERHAUSER, 2, CrowdStorage::Segments),
+        (21, BESSEL_OVERHAUSER, 2, CrowdStorage::Segments),
+        (60, SLERP, 1, CrowdStorage::Compact),
     ] {
-        let library = library(joints, method);
+        let library = library(joints, method, storage);
         for values in CrowdValues::ALL {
             for output in [CrowdOutput::from(values), CrowdOutput::half(values)] {
                 let kernel = assert_stores_whole_lines(&library, layers, output, None);
@@ -165,6 +169,8 @@ fn whole_instances_store_whole_lines() {
         Kernel::CrowdPlainWholeRotations,
         Kernel::CrowdWholeMatrices,
         Kernel::CrowdPlainWholeMatrices,
+        Kernel::CrowdCompactWholeRotations,
+        Kernel::CrowdCompactWholeMatrices,
     ];
     assert!(
         all.iter()
@@ -176,7 +182,7 @@ fn whole_instances_store_whole_lines() {
 #[test]
 fn subgroups_store_whole_lines() {
     for (joints, lanes) in [(60, 8), (60, 16), (60, 32), (60, 64), (8, 32), (2, 64)] {
-        let library = library(joints, SLERP);
+        let library = library(joints, SLERP, CrowdStorage::Segments);
         let rotations = CrowdValues::Rotations;
         assert_stores_whole_lines(&library, 1, rotations.into(), Some(lanes));
         // Eight lanes store half of the largest line.

@@ -268,14 +268,22 @@ fn layered(
 
 #[test]
 fn joints_of_crowds() {
-    for kernel in [Kernel::CrowdRotations, Kernel::CrowdPlainRotations] {
+    for kernel in [
+        Kernel::CrowdRotations,
+        Kernel::CrowdPlainRotations,
+        Kernel::CrowdCompactRotations,
+    ] {
         assert_is(kernel, |trial| {
             layered(trial, |layers, instance, joint| {
                 vec![layers.layered(instance, joint, ROTATION)]
             })
         });
     }
-    for kernel in [Kernel::CrowdLocals, Kernel::CrowdPlainLocals] {
+    for kernel in [
+        Kernel::CrowdLocals,
+        Kernel::CrowdPlainLocals,
+        Kernel::CrowdCompactLocals,
+    ] {
         assert_is(kernel, |trial| {
             layered(trial, |layers, instance, joint| {
                 let [rotation, moved, scale] = [ROTATION, TRANSLATION, SCALE]

@@ -4,7 +4,7 @@ use std::ffi::{CString, c_char};
 use std::sync::{OnceLock, RwLock, RwLockReadGuard, RwLockWriteGuard};
 
 use glam::{Affine3A, Mat3A, Vec3A};
-use tumble::crowd::CrowdLibrary;
+use tumble::crowd::{CrowdLibrary, CrowdStorage};
 use tumble::{Skeleton, VectorMethod};
 use tumble_formats::motion::{Joint, Transform};
 use tumble_formats::skeleton::ClipSkeleton;
@@ -130,6 +130,43 @@ pub(crate) unsafe fn vector_method(
             method.map_err(|error| Failure::argument(error.to_string()))
         }
     }
+}
+
+/// Sets how clips are stored that are added from now on: "segments" (also if `storage` is null) or "compact".
+///
+/// Poses have the same bits. Compact clips take a third to a sixth of the memory where keys are close, and poses take
+/// longer. `tumble_crowd_library_bytes_per_key` returns how much memory clips take.
+///
+/// # Errors
+/// `TUMBLE_RESULT_INVALID_ARGUMENT` if the name is unknown.
+///
+/// # Safety
+/// `storage` must be null or a text that ends with a zero byte.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn tumble_crowd_library_set_storage(
+    library: *mut TumbleCrowdLibrary,
+    storage: *const c_char,
+) -> TumbleResult {
+    code(|| {
+        let library = handle::get(library)?;
+        // SAFETY: as the caller promises.
+        let storage = match unsafe { text(storage, "storage")? } {
+            None => CrowdStorage::default(),
+            Some(name) => {
+                let storage = name.parse::<CrowdStorage>();
+                storage.map_err(|error| Failure::argument(error.to_string()))?
+            }
+        };
+        library.write()?.set_storage(storage);
+        Ok(())
+    })
+}
+
+/// Returns the bytes of the clips divided by the number of their keys (of rotations, translations and scales), on the CPU
+/// and on devices; 0 if the handle is invalid.
+#[unsafe(no_mangle)]
+pub extern "C" fn tumble_crowd_library_bytes_per_key(library: *const TumbleCrowdLibrary) -> f64 {
+    guarded(|| Ok(handle::get(library)?.read()?.bytes_per_key())).unwrap_or(0.0)
 }
 
 /// Adds a clip to a library.

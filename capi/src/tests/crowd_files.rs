@@ -369,15 +369,90 @@ fn a_fox_plays_its_clips() {
         return;
     }
     let file = load(fox);
-    let library = library_of(file);
     let clips = tumble_file_clip_count(file);
     assert_eq!(clips, 3);
-    for clip in 0..clips {
-        done(push_clip(library, file, clip, null(), None));
+    let rust_library = by_hand(fox, method::SLERP);
+    // Poses are the same however clips are stored.
+    for (storage, bytes) in [(c"segments", 40.0..70.0), (c"compact", 16.0..24.0)] {
+        let library = library_of(file);
+        // SAFETY: text.
+        done(unsafe { tumble_crowd_library_set_storage(library, storage.as_ptr()) });
+        for clip in 0..clips {
+            done(push_clip(library, file, clip, null(), None));
+        }
+        same(library, &rust_library);
+        let found = tumble_crowd_library_bytes_per_key(library);
+        assert!(bytes.contains(&found), "{storage:?}: {found}");
+        // SAFETY: text.
+        let unknown = unsafe { tumble_crowd_library_set_storage(library, c"keys".as_ptr()) };
+        fails(unknown, TumbleResult::InvalidArgument, "`keys`");
+        done(tumble_crowd_library_free(library));
     }
-    same(library, &by_hand(fox, method::SLERP));
-    done(tumble_crowd_library_free(library));
     done(tumble_file_free(file));
+}
+
+#[test]
+fn measure_tmp() {
+    use tumble::crowd::CrowdStorage;
+    let data = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/data/");
+    for (file, step) in [
+        ("bvh/cmu_01_01.bvh", 1),
+        ("bvh/cmu_01_01.bvh", 4),
+        ("gltf/Fox.glb", 1),
+    ] {
+        let loaded =
+            Format::open_detected(Path::new(&format!("{data}{file}")), &ReadOptions::default())
+                .unwrap();
+        let joints = &loaded.clips[0].skeleton;
+        let parents: Vec<_> = joints.iter().map(|joint| joint.parent).collect();
+        let offsets: Vec<_> = joints.iter().map(|joint| joint.rest.translation).collect();
+        for method in [method::SLERP, method::BESSEL_OVERHAUSER, method::SQUAD] {
+            for storage in CrowdStorage::ALL {
+                let skeleton = Skeleton::new(parents.clone(), offsets.clone()).unwrap();
+                let mut library = CrowdLibrary::new(&skeleton).unwrap();
+                library.set_storage(storage);
+                let mut keys = 0;
+                for motion in &loaded.clips {
+                    let mut set = TrackSet::new();
+                    for track in motion.set.tracks() {
+                        let times: Vec<f64> = track.times.iter().step_by(step).copied().collect();
+                        let quats: Vec<Quat> = track.keys.iter().step_by(step).copied().collect();
+                        keys += times.len();
+                        set.push(track.name, &times, &quats).unwrap();
+                    }
+                    library.push(&set, method, VectorMethod::Linear).unwrap();
+                }
+                let engine = tumble::Engine::new(tumble::Device::Cpu).unwrap();
+                let mut crowd = engine.crowd(&library, 2000, 1).unwrap();
+                for i in 0..2000 {
+                    crowd
+                        .set(
+                            i,
+                            0,
+                            CrowdLayer::new(i % loaded.clips.len()).at(i as i64 * 9973),
+                        )
+                        .unwrap();
+                }
+                let mut output = vec![[0.0; 4]; crowd.output_len(CrowdValues::Rotations)];
+                let mut times = Vec::new();
+                for _ in 0..30 {
+                    crowd.advance(1.0 / 60.0).unwrap();
+                    let start = std::time::Instant::now();
+                    crowd
+                        .evaluate_into(CrowdValues::Rotations, &mut output)
+                        .unwrap();
+                    times.push(start.elapsed().as_secs_f64() * 1e9 / output.len() as f64);
+                }
+                times.sort_by(f64::total_cmp);
+                println!(
+                    "{file} /{step} {method} {storage}: {keys} keys, {:.2} bytes, {:.2} ns (fastest {:.2})",
+                    library.bytes_per_key(),
+                    times[15],
+                    times[0]
+                );
+            }
+        }
+    }
 }
 
 /// Poses that are relative to the world, and joints that share a name, make no library.

@@ -1961,8 +1961,12 @@ class Crowd:
         inverse_bind: ArrayLike | None = None,
         references: dict[int, tuple[int, float]] | None = None,
         ticks_per_second: int = 705600,
+        storage: Literal["segments", "compact"] = "segments",
         engine: Engine | None = None,
     ) -> Crowd: ...
+    @property
+    def bytes_per_key(self) -> float:
+        """Bytes of the clips divided by the number of their keys, on the CPU and on devices."""
     @property
     def instances(self) -> int:
         """Number of instances."""

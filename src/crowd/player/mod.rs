@@ -120,7 +120,7 @@ impl Crowd {
             links: &library.links,
             levels: &library.levels,
             bind: &library.bind,
-            only_arcs: tables.has_only_arcs(),
+            forms: tables.forms(),
             arguments: self.arguments,
         })?)
     }

@@ -1,10 +1,13 @@
 //! Trials of the kernels over a crowd.
 
+use crate::machine::crowd::CrowdCurves;
 use crate::shader::{
     CHANNELS, CrowdBase, CrowdChange, CrowdChannel, CrowdClip, CrowdDispatch, CrowdEntry,
-    CrowdLink, CrowdPosition, CrowdSpan, FORM_ARC, FORM_CONSTANT, FORM_CUBIC, FORM_POLYNOMIAL,
-    Kernel, ON_KEY, ROTATION, RUNS_BACKWARDS, SPEED_MAGNITUDE, START_BIAS,
+    CrowdLink, CrowdPosition, CrowdSpan, FORM_ARC, FORM_ARC_KEYS, FORM_CONSTANT, FORM_CUBIC,
+    FORM_CUBIC_KEYS, FORM_LINE, FORM_POLYNOMIAL, KEY_AT_END, Kernel, ON_KEY, ROTATION,
+    RUNS_BACKWARDS, SPEED_MAGNITUDE, START_BIAS, TangentWeights,
 };
+use crate::twin::crowd_compact::SOURCE_FLOAT;
 use crate::twin::crowd_entries::change;
 use crate::twin::crowd_matrices::Rows;
 
@@ -24,6 +27,7 @@ pub(super) const CELLS: u32 = 72;
 pub(super) const MASKS: u32 = 3;
 
 pub(super) fn trials(kernel: Kernel, random: &mut Random) -> Vec<Trial> {
+    use CrowdCurves::{Any, Compact, Plain};
     match kernel {
         Kernel::CrowdTimes => vec![times(random)],
         Kernel::CrowdWalk => vec![walk(random)],
@@ -32,10 +36,12 @@ pub(super) fn trials(kernel: Kernel, random: &mut Random) -> Vec<Trial> {
         Kernel::CrowdHalf => vec![half(random)],
         Kernel::CrowdGather => vec![gathered(random)],
         Kernel::CrowdScatter => vec![scattered(random)],
-        Kernel::CrowdPlainRotations => vec![joints(random, 1, true, false)],
-        Kernel::CrowdPlainLocals => vec![joints(random, 1, true, true)],
-        Kernel::CrowdRotations => vec![joints(random, 3, false, false)],
-        _ => vec![joints(random, 3, false, true)],
+        Kernel::CrowdPlainRotations => vec![joints(random, 1, Plain, false)],
+        Kernel::CrowdPlainLocals => vec![joints(random, 1, Plain, true)],
+        Kernel::CrowdRotations => vec![joints(random, 3, Any, false)],
+        Kernel::CrowdCompactRotations => vec![joints(random, 3, Compact, false)],
+        Kernel::CrowdCompactLocals => vec![joints(random, 3, Compact, true)],
+        _ => vec![joints(random, 3, Any, true)],
     }
 }
 
@@ -165,25 +171,115 @@ pub(super) fn plain(random: &mut Random, form: u32) -> CrowdChannel {
     }
 }
 
-fn joints(random: &mut Random, layers: u32, is_plain: bool, are_locals: bool) -> Trial {
+/// Channels that are stored compactly, with two spans each, and their cells, of which the first has an index.
+pub(super) struct CompactGroups {
+    pub(super) cells: Vec<[f32; 4]>,
+    channels: Vec<CrowdChannel>,
+}
+
+impl CompactGroups {
+    pub(super) fn new(random: &mut Random, first: u32) -> Self {
+        // Keys, of which the last is at the end of the last span.
+        const ROWS: usize = 3;
+        const CUBICS: usize = 5;
+        const OTHERS: usize = 2;
+        let mut key = [0; CUBICS].map(|_| random.unit());
+        let mut row = |random: &mut Random| {
+            for key in &mut key {
+                let step = random.step();
+                *key = random.near(*key, step);
+            }
+            // Some have another sign than they were added with.
+            key.map(|key| match random.once_in(3) {
+                true => key.map(|component| component * 4.0),
+                false => key,
+            })
+        };
+        let (mut cells, mut channels) = (Vec::new(), Vec::new());
+        let of_sources = CUBICS.div_ceil(4);
+        let segments = (ROWS * (1 + of_sources + CUBICS)) as u32;
+        for index in 0..ROWS {
+            let weights = random.weights();
+            let kind = match index {
+                1 => weights.kind,
+                _ => KEY_AT_END,
+            };
+            cells.push(bytemuck::cast(TangentWeights { kind, ..weights }));
+            for _ in 0..of_sources {
+                // Segments of degree 6, 8 and 10.
+                let [degree_6, degree_8, degree_10] = [0, 7, 16].map(|row| (segments + row) << 2);
+                let sources = [0, 0, degree_6, degree_8 | 1, degree_10 | 2];
+                let word = |()| {
+                    let source = sources[random.below(5) as usize];
+                    f32::from_bits(SOURCE_FLOAT | source)
+                };
+                cells.push([(); 4].map(word));
+            }
+            cells.extend(row(random));
+        }
+        cells.extend((0..7 + 9 + 11).map(|_| random.rotation()));
+        let keys_of_row = (1 + of_sources) as u32;
+        channels.extend((0..CUBICS as u32).map(|member| CrowdChannel {
+            first: first + keys_of_row + member,
+            count: CUBICS as u32,
+            form_and_base: FORM_CUBIC_KEYS << 24,
+            keys: first,
+        }));
+        for form in [FORM_ARC_KEYS, FORM_LINE] {
+            let start = first + cells.len() as u32;
+            for _ in 0..ROWS {
+                let keys = row(random);
+                cells.extend_from_slice(&keys[..OTHERS]);
+            }
+            channels.extend((0..OTHERS as u32).map(|member| CrowdChannel {
+                first: start + member,
+                count: OTHERS as u32,
+                form_and_base: form << 24,
+                keys: start + member,
+            }));
+        }
+        Self { cells, channels }
+    }
+
+    /// One of the channels, or one of any other form.
+    pub(super) fn channel(&self, random: &mut Random) -> CrowdChannel {
+        let other = channel(random);
+        let compact = self.channels[random.below(self.channels.len() as u32) as usize];
+        let base = other.form_and_base & 0x00ff_ffff;
+        match random.once_in(3) {
+            true => other,
+            false => CrowdChannel {
+                form_and_base: compact.form_and_base | base,
+                ..compact
+            },
+        }
+    }
+}
+
+fn joints(random: &mut Random, layers: u32, curves: CrowdCurves, are_locals: bool) -> Trial {
     let entries: Vec<_> = (0..(BEFORE + INSTANCES) * layers)
         .map(|_| {
             let clip = random.below(CLIPS);
             entry(random, clip, 1 << 20, 0)
         })
         .collect();
+    let compact = (curves == CrowdCurves::Compact).then(|| CompactGroups::new(random, CELLS));
     let channels: Vec<_> = (0..CLIPS * JOINTS * CHANNELS)
-        .map(|i| match (is_plain, i % CHANNELS == ROTATION) {
-            (true, true) => plain(random, FORM_ARC),
-            (true, false) => plain(random, FORM_CUBIC),
-            (false, _) => channel(random),
+        .map(|i| match (&compact, curves, i % CHANNELS == ROTATION) {
+            (Some(groups), ..) => groups.channel(random),
+            (None, CrowdCurves::Plain, true) => plain(random, FORM_ARC),
+            (None, CrowdCurves::Plain, false) => plain(random, FORM_CUBIC),
+            (None, ..) => channel(random),
         })
         .collect();
-    let (masks, references) = (CELLS, CELLS + MASKS * JOINTS);
-    let mut cells: Vec<[f32; 4]> = (0..references + CLIPS * JOINTS * CHANNELS)
-        .map(|_| random.rotation())
-        .collect();
-    if is_plain {
+    let compact = compact.map(|groups| groups.cells).unwrap_or_default();
+    let masks = CELLS + compact.len() as u32;
+    let references = masks + MASKS * JOINTS;
+    let mut cells: Vec<[f32; 4]> = (0..CELLS).map(|_| random.rotation()).collect();
+    cells.extend(compact);
+    let rest = MASKS * JOINTS + CLIPS * JOINTS * CHANNELS;
+    cells.extend((0..rest).map(|_| random.rotation()));
+    if curves != CrowdCurves::Any {
         cells[0] = [0.0; 4];
     }
     let positions: Vec<_> = (0..INSTANCES * layers * BASES)

@@ -123,6 +123,8 @@ pub(crate) fn trials(kernel: Kernel, random: &mut Random) -> Vec<Trial> {
         | Kernel::CrowdPlainRotations
         | Kernel::CrowdLocals
         | Kernel::CrowdPlainLocals
+        | Kernel::CrowdCompactRotations
+        | Kernel::CrowdCompactLocals
         | Kernel::CrowdTimes
         | Kernel::CrowdWalk
         | Kernel::CrowdWalkAll
@@ -134,6 +136,8 @@ pub(crate) fn trials(kernel: Kernel, random: &mut Random) -> Vec<Trial> {
         | Kernel::CrowdPlainWholeRotations
         | Kernel::CrowdWholeMatrices
         | Kernel::CrowdPlainWholeMatrices
+        | Kernel::CrowdCompactWholeRotations
+        | Kernel::CrowdCompactWholeMatrices
         | Kernel::CrowdSubgroupRotations
         | Kernel::CrowdSubgroupRotationsF16 => whole_instances::trials(kernel, random),
         Kernel::MotionJoints

@@ -1,5 +1,6 @@
 //! Trials of the kernels over whole instances of a crowd.
 
+use crate::machine::crowd::CrowdCurves;
 use crate::math::canonical::canonical;
 use crate::output::crowd::{CrowdOutput, CrowdValues};
 use crate::shader::{
@@ -14,8 +15,8 @@ use crate::work::whole_instances::joint_share;
 use bytemuck::Zeroable as _;
 
 use super::crowd::{
-    BASES, BEFORE, CELLS, CLIPS, JOINTS, LEVELS, MASKS, channel, entry, links_of_levels, plain,
-    rows,
+    BASES, BEFORE, CELLS, CLIPS, CompactGroups, JOINTS, LEVELS, MASKS, channel, entry,
+    links_of_levels, plain, rows,
 };
 use super::random::Random;
 use super::{Trial, bytes};
@@ -37,12 +38,17 @@ pub(super) fn trials(kernel: Kernel, random: &mut Random) -> Vec<Trial> {
             .map(|instances| of_subgroups(random, instances))
             .into();
     }
-    let is_plain = matches!(
-        kernel,
-        Kernel::CrowdPlainWholeRotations | Kernel::CrowdPlainWholeMatrices
-    );
+    let curves = match kernel {
+        Kernel::CrowdPlainWholeRotations | Kernel::CrowdPlainWholeMatrices => CrowdCurves::Plain,
+        Kernel::CrowdCompactWholeRotations | Kernel::CrowdCompactWholeMatrices => {
+            CrowdCurves::Compact
+        }
+        _ => CrowdCurves::Any,
+    };
     let outputs = match kernel {
-        Kernel::CrowdWholeRotations | Kernel::CrowdPlainWholeRotations => {
+        Kernel::CrowdWholeRotations
+        | Kernel::CrowdPlainWholeRotations
+        | Kernel::CrowdCompactWholeRotations => {
             vec![CrowdOutput::from(Rotations), CrowdOutput::half(Rotations)]
         }
         _ => vec![
@@ -52,13 +58,13 @@ pub(super) fn trials(kernel: Kernel, random: &mut Random) -> Vec<Trial> {
             CrowdOutput::half(Skinning),
         ],
     };
-    let trial = |output| WholeScene::new(random, is_plain, &SMALL).trial(output);
+    let trial = |output| WholeScene::new(random, curves, &SMALL).trial(output);
     outputs.into_iter().map(trial).collect()
 }
 
 /// A trial of the kernel whose subgroups take whole instances, for subgroups of any number of lanes.
 fn of_subgroups(random: &mut Random, instances: u32) -> Trial {
-    let scene = WholeScene::new(random, true, &LARGE);
+    let scene = WholeScene::new(random, CrowdCurves::Plain, &LARGE);
     let arguments = CrowdDispatch {
         count: INSTANCES - 1,
         first_instance: BEFORE,
@@ -105,19 +111,19 @@ struct WholeScene {
     spans: Vec<CrowdSpan>,
     channels: Vec<CrowdChannel>,
     cells: Vec<[f32; 4]>,
+    /// The cell of the first mask, and that of the first reference pose.
+    tables: [u32; 2],
     bind: Vec<Rows>,
 }
 
-/// Where the masks and the reference poses begin among the cells.
-const CELL_TABLES: [u32; 2] = [CELLS, CELLS + MASKS * JOINTS];
-
 impl WholeScene {
-    fn new(random: &mut Random, is_plain: bool, size: &Size) -> Self {
+    fn new(random: &mut Random, curves: CrowdCurves, size: &Size) -> Self {
         let &Size {
             joints,
             spans: max_spans,
             cells,
         } = size;
+        let is_plain = curves == CrowdCurves::Plain;
         let layers = if is_plain { 1 } else { 4 };
         let (mut clips, mut bases, mut spans) = (Vec::new(), Vec::new(), Vec::new());
         for clip in 0..CLIPS {
@@ -153,11 +159,13 @@ impl WholeScene {
                 }));
             }
         }
+        let compact = (curves == CrowdCurves::Compact).then(|| CompactGroups::new(random, cells));
         let channels = (0..CLIPS * joints * CHANNELS).map(|index| {
-            let any = match (is_plain, index % CHANNELS == ROTATION) {
-                (true, true) => plain(random, FORM_ARC),
-                (true, false) => plain(random, FORM_CUBIC),
-                (false, _) => channel(random),
+            let any = match (&compact, is_plain, index % CHANNELS == ROTATION) {
+                (Some(groups), ..) => groups.channel(random),
+                (None, true, true) => plain(random, FORM_ARC),
+                (None, true, false) => plain(random, FORM_CUBIC),
+                (None, false, _) => channel(random),
             };
             let base = random.below(clips[(index / (joints * CHANNELS)) as usize].bases);
             CrowdChannel {
@@ -166,6 +174,7 @@ impl WholeScene {
             }
         });
         let channels = channels.collect();
+        let compact = compact.map(|groups| groups.cells).unwrap_or_default();
         let entries = (0..(BEFORE + INSTANCES) * layers).map(|_| {
             let clip = random.below(CLIPS);
             let played = &clips[clip as usize];
@@ -180,12 +189,16 @@ impl WholeScene {
             entry
         });
         let entries = entries.collect();
-        let cells = cells + MASKS * joints + CLIPS * joints * CHANNELS;
+        let masks = cells + compact.len() as u32;
         let mut cells: Vec<[f32; 4]> = (0..cells).map(|_| random.rotation()).collect();
-        if is_plain {
+        cells.extend(compact);
+        let rest = MASKS * joints + CLIPS * joints * CHANNELS;
+        cells.extend((0..rest).map(|_| random.rotation()));
+        if curves != CrowdCurves::Any {
             cells[0] = [0.0; 4];
         }
         Self {
+            tables: [masks, masks + MASKS * joints],
             layers,
             entries,
             bind: (0..JOINTS).map(|_| rows(random)).collect(),
@@ -201,7 +214,7 @@ impl WholeScene {
         let is_rotations = output.values == CrowdValues::Rotations;
         let walks = matches!(output.values, CrowdValues::Model | CrowdValues::Skinning);
         let (links, first_link) = links_of_levels();
-        let [masks, references] = CELL_TABLES;
+        let [masks, references] = self.tables;
         let pushed = CrowdWholeDispatch {
             count: INSTANCES,
             first_instance: BEFORE,
