@@ -71,7 +71,7 @@ fn lavapipe_gives_the_same_bits_at_every_width_and_number_of_threads() {
             ("LP_NATIVE_VECTOR_WIDTH", *width),
             ("LP_NUM_THREADS", threads),
         ];
-        // All of both forms' kernels; methods differ on the host.
+        // These two methods use all kernels of both forms; other methods differ only on the host.
         let run = verify(LAVAPIPE, "slerp,c2", &environment);
         let output = String::from_utf8(run.out).unwrap();
         assert_eq!(run.code, 0, "{environment:?}: {output}{}", run.words);

@@ -115,7 +115,8 @@ fn a_gltf_keeps_all_but_its_keys() {
     let said = succeed(folder, &["reduce", fox, "-o", "lines.glb"]);
     let sizes = "lines.glb (162.9 kB → 144.9 kB)\n";
     assert!(said.words.contains(sizes), "{}", said.words);
-    // Rotations of 16 bits stand in the file beside all else, or in a new one, compressed.
+    // Rotations of 16 bits are written into a copy of the file with its other content, or into a
+    // new, compressed file.
     let bounds = ["--world", "--tolerance", "0.1001"];
     for (name, more) in [
         ("short.glb", &["--quantize"][..]),

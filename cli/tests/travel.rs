@@ -93,8 +93,8 @@ fn the_guide_s_pipe_leads_a_box_over_the_hill() {
         let off = hill.nearest(at).distance(at);
         assert!(off < 0.01, "{at} is {off} off the hill");
         let clear = rocks.nearest(at).distance(at);
-        // The route's clearance, less the rounding of its points. All of a box 0.6 long is nearer to its
-        // foot: the upper corners are √(0.3² + 0.18² + 0.24²) = 0.424 away.
+        // The route's clearance, minus the rounding of its points. No point of a box of length 0.6 is
+        // farther than this from its foot: the upper corners are √(0.3² + 0.18² + 0.24²) = 0.424 away.
         assert!(clear > 0.45 - 1e-5, "{at} is {clear} from a rock");
         let up = Quat::from_slice(&pose[3..]) * Vec3::Y;
         // Ground of 40° at most, 5° for looking ahead.

@@ -171,7 +171,7 @@ fn clips_that_cannot_be_compared_are_drawn_and_named() {
     let hung = "compared in the world, because `hand` has the parent `arm` in a.bvh, \
                 but has the parent `hip` in hung.bvh";
     let other = "not compared: no joint has the same name in both \
-                 (`hip` and `Hip` are near, but only equal names match)";
+                 (`hip` and `Hip` are similar, but only equal names match)";
     for line in [
         format!("a.bvh and hung.bvh: {hung}"),
         format!("a.bvh and other.bvh: {other}"),

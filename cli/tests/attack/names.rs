@@ -123,7 +123,7 @@ fn animations_of_any_name_get_files() {
     }
 }
 
-/// One clip that cannot be written is that clip's failure.
+/// If one clip cannot be written, only this clip fails.
 #[test]
 fn one_clip_that_cannot_be_written_does_not_end_the_others() {
     let temporary = sample_folder();
