@@ -532,7 +532,7 @@ fn a_map_s_origin_is_reported() {
     .unwrap();
     let path = std::ffi::CString::new(file.to_str().unwrap()).unwrap();
     let mut file = null_mut();
-    // SAFETY: text, and room for the handle.
+    // SAFETY: the path is a text that ends in NUL, and `file` has room for the handle.
     let loaded = unsafe { tumble_file_load(path.as_ptr(), &raw mut file) };
     assert_eq!(loaded, TumbleResult::Ok, "{}", words());
     let mut origin = [1.0; 3];
