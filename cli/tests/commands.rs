@@ -93,11 +93,11 @@ fn commands_of_the_readme_work_in_a_clone() {
     assert!(lines.len() >= 2, "{lines:?}");
     for line in lines {
         let command = line.split('#').next().unwrap();
-        // There may be no browser here.
+        // `--open` would need a browser.
         let command = command.replace("--open", "-o page.html");
         let words: Vec<&str> = command.split_whitespace().collect();
         let run = crate::program::run(folder.path(), &words);
-        // `verify` says so where there is no Vulkan device.
+        // Without a Vulkan device, `verify` ends with the exit code 5.
         let is_done = run.code == 0 || words[0] == "verify" && run.code == 5;
         assert!(is_done, "{line}: {}", run.words);
     }

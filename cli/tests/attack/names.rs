@@ -50,7 +50,7 @@ fn no_name_ends_a_batch() {
         first.words
     );
     let made = entries(&folder.join("out"));
-    // Results of a list keep its tree.
+    // Results of the inputs in a list have the directories of the list.
     assert_eq!(made.len(), 9, "{made:?}");
     assert!(made.contains(&format!("walks/{}.npy", "x".repeat(251))));
     let whole = tree(&folder.join("out"));
@@ -204,7 +204,7 @@ fn results_never_share_a_name() {
             .iter()
             .eq(["b.npy", "manifest.jsonl"])
     );
-    // A directory that only shards may use, and results that are inputs.
+    // The input is in a directory `manifest.d`, whose name in a result belongs to shards.
     fs::create_dir_all(folder.join("odd/manifest.d")).unwrap();
     fs::write(folder.join("odd/manifest.d/a.dat"), &keys).unwrap();
     fs::write(folder.join("odd/b.dat"), &keys).unwrap();
