@@ -74,7 +74,7 @@ impl Layer {
             driver: on_device.then(lavapipe).flatten(),
             planted,
         };
-        // Its messages about its settings are no faults.
+        // Messages of the layer about its own settings are not faults.
         let filter = "message_id_filter = VALIDATION-SETTINGS,WARNING-Setting-Limit-Adjusted";
         match on_device {
             true => layer.settings(&["validate_core = false", "gpuav_enable = true", filter]),
