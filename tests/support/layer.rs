@@ -70,7 +70,7 @@ impl Layer {
             name,
             folder: tempfile::tempdir().unwrap(),
             has_manifest: true,
-            // Checks on the device need buffer addresses, which SwiftShader has not.
+            // Checks on the device need buffer addresses, which SwiftShader does not have.
             driver: on_device.then(lavapipe).flatten(),
             planted,
         };
