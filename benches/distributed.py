@@ -119,7 +119,7 @@ def simulate(model: argparse.Namespace) -> None:
     todo = shards
     while todo:
         ready, worker = heapq.heappop(free)
-        # It is handed out as soon as the driver has come to it: with 32 tasks a core in flight the driver
+        # A task is handed out as soon as the driver reaches it: with 32 tasks per core in flight, the driver
         # never waits for a worker.
         driver += model.task / 1e3
         begin = max(ready, driver)
@@ -130,8 +130,8 @@ def simulate(model: argparse.Namespace) -> None:
         done = max(done, storage)
         if lost and lost[0] < done:
             lost.pop(0)
-            # Whatever the node's workers had begun is done again, elsewhere; this worker stands for
-            # all of them, and comes back later.
+            # The shards that the node's workers had begun are done again by other workers. This entry
+            # stands for all workers of the node; it returns later.
             again += model.cores
             todo += model.cores - 1
             heapq.heappush(free, (done + model.back, worker))

@@ -148,7 +148,7 @@ def main():
     values = random.random((64, samples, 3), dtype=numpy.float32)
     gauss = numpy.exp(-0.125 * numpy.arange(-8, 9) ** 2)
     for name, weights in ("linear", [0.25, 0.5, 0.25]), ("gaussian:2", gauss / gauss.sum()):
-        # The axis of time last and each number by itself is how SciPy is fastest.
+        # SciPy is fastest if time is the last axis and each component is a separate row.
         rows = numpy.ascontiguousarray(values.transpose(0, 2, 1))
         scipys = milliseconds(lambda: convolve1d(rows, weights, axis=-1), min(rounds, 3))
         print(f"  SciPy, convolve1d: {name:12} vectors              {scipys:10.1f}")

@@ -33,7 +33,8 @@ def missing(origin, link):
     found = page(target) if target.endswith(".html") else os.path.isfile(target) and (None, None)
     if not found:
         return "no such file"
-    # Lines of source pages, and ranges of them, are made by a script.
+    # Anchors of lines in source pages (`#12`, `#12-20`) are made by JavaScript, so the page does
+    # not contain them.
     is_line = re.fullmatch(r"[\d-]+", anchor) and "/src/" in target
     if anchor and found[1] is not None and not is_line and unquote(anchor) not in found[1]:
         return "no such anchor"

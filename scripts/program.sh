@@ -12,7 +12,7 @@ case $host in
 *windows*) program=tumble.exe ;;
 *) program=tumble ;;
 esac
-# It starts, and knows its version.
+# The program starts and prints its version.
 "$target/release/$program" --version | grep -qF "$version"
 rm -rf "target/program/$name"
 mkdir -p "target/program/$name"

@@ -29,7 +29,7 @@ fi
 # built a second time.
 cargo build --quiet --workspace --lib --test cost
 
-# As `pip install` lays it out.
+# The package as `pip install` installs it.
 site=$("$environment/bin/python" -c 'import sysconfig; print(sysconfig.get_path("purelib"))')
 rm -rf "$site/tumble"
 cp -r python/package/tumble "$site/tumble"

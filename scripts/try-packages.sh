@@ -21,7 +21,7 @@ inside 'cd /root && apt-get update -qq && apt-get install -y -qq --no-install-re
 
 echo "the wheel, without a compiler"
 inside 'apt-get install -y -qq --no-install-recommends python3-venv ca-certificates >/dev/null && ! command -v cc'
-# NumPy comes from where pip on this machine gets it, with the certificates of this machine.
+# NumPy is installed from the index that pip on this machine uses, with this machine's certificates.
 certificates=etc/ssl/certs/ca-certificates.crt
 if [ -e "/$certificates" ]; then cp "/$certificates" "$root/$certificates"; fi
 inside 'cd /root && python3 -m venv env && env/bin/pip install --quiet --cert /etc/ssl/certs/ca-certificates.crt *.whl

@@ -36,7 +36,7 @@ fn errors(set: &TrackSet, interpolation: Interpolation, frames: &SampleTimes) ->
             let found = rotations.get(t, s).unwrap().as_dquat();
             let time = timeline.time(t, s).unwrap();
             let error = angle_between(found, curve.rotation(time));
-            // Only where controls are the bisectors themselves have they been opposite.
+            // Controls are opposite only if they are the bisectors themselves (`shoemake`).
             let may_be_none = method == tumble::method::SHOEMAKE;
             if may_be_none && error > 1e-6 && !is_defined(&interpolation, track, time) {
                 undefined += 1;
@@ -201,7 +201,7 @@ fn accuracy_does_not_decay_by_hour_24() {
 fn accuracy_does_not_decay_along_a_day() {
     let mut random = Random(6);
     let mut set = TrackSet::new();
-    // A key a second at the end, where it is sampled, and every ten before.
+    // A key every ten seconds, and at the end, where the track is sampled, one every second.
     let sparse = (0..8600).map(|i| 10.0 * f64::from(i));
     let times: Vec<f64> = sparse.chain((86_000..=86_400).map(f64::from)).collect();
     let keys: Vec<Quat> = times.iter().map(|_| random.rotation().as_quat()).collect();

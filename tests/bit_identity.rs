@@ -114,7 +114,7 @@ fn every_vector_width_and_thread_count_gives_the_same_bits() {
 /// times, with ordinary and with streaming stores, with vectors of every width.
 #[test]
 fn runs_of_every_length_have_the_bits_of_single_samples() {
-    // Each length once, long ones behind short ones.
+    // Each length occurs once; long runs follow short ones.
     let lengths = (0..140u16).map(|i| f64::from(1 + i * 61 % 140));
     let ends = lengths.scan(0.0, |end, length| {
         *end += length;
@@ -180,7 +180,7 @@ fn every_memory_budget_transfer_and_layout_gives_the_same_bits() {
                         stage(options, variant + budget);
                     }
                     (options.reads, options.mapping) = (reads, mapping);
-                    // With each budget both.
+                    // Both occur with each memory limit.
                     options.prepare_arcs = match (variant + budget / 2) % 2 {
                         0 => PrepareArcs::OnDevice,
                         _ => PrepareArcs::OnHost,
@@ -360,7 +360,7 @@ fn arbitrary_times_have_the_same_bits() {
 
 #[test]
 fn the_path_as_authored_has_the_same_bits() {
-    // Random rotations: half of the steps go the long way round.
+    // The rotations are random, so half of the steps as authored are the longer way.
     let mut random = Random(21);
     let mut set = TrackSet::new();
     for _ in 0..200 {
@@ -429,8 +429,8 @@ fn stretches_of_a_long_track_have_the_bits_of_the_whole() {
             let frames = SampleTimes::fps(10).between(time(first), time(last));
             let found = clip.evaluate(&frames).unwrap();
             let expected = &whole.as_quats()[first..=last];
-            // A frame is counted from another start here, so only keys are the same
-            // to the bit; every frame lies on one, or is held.
+            // Frames are counted from another start here, so only those at keys have the same bits.
+            // Every frame is at a key or outside the keys.
             if method.interpolates {
                 assert_same_bits(expected, found.as_quats(), &format!("{method}, {first}"));
             }
@@ -558,7 +558,7 @@ fn few_samples_of_many_keys_have_the_same_bits() {
                 1.0
             };
             keys.push(random.rotation().as_quat() * sign);
-            // Some keys on whole frames, some a hair apart, some far.
+            // Some keys are on whole frames, some are very near the key before, some far from it.
             time = match random.next() % 16 {
                 0 => ((time * 25.0).floor() + 2.0) / 25.0,
                 1 => time + 1e-9,
@@ -687,7 +687,7 @@ fn tracks_have_the_same_bits_whatever_is_beside_them() {
     let mut random = Random(84);
     let mut tracks = Vec::new();
     for track in 0..60 {
-        // First two keys alone, with nothing before them in their block.
+        // The first track has two keys, with nothing before them in their block.
         let count = [2, 3, 4, 26, 2, 27, 64, 5, 65, 2, 130, 66][track % 12];
         let longest = random.pick(&[0.03, 0.3, 0.7, 1.2, 3.1]);
         let (mut times, mut keys) = (Vec::new(), Vec::new());
@@ -941,7 +941,7 @@ fn crowds_of_two_keys_have_the_same_bits() {
         let first = random.rotation();
         let step = [0.0, 1e-7, 1e-3, 0.4, 1.5, 3.0, 3.1, std::f64::consts::PI][track % 8];
         let rotation = DQuat::from_axis_angle(random.direction(), step);
-        // Between opposite keys no arc is defined as authored.
+        // As authored, the arc between opposite keys is not defined.
         let sign = if track % 3 == 0 && step > 0.1 {
             -1.0
         } else {
@@ -976,7 +976,7 @@ fn crowds_of_two_keys_have_the_same_bits() {
             let expected = clip.evaluate(frames).unwrap();
             assert!(expected.as_quats().len() < set.key_count(), "few samples");
             assert_everywhere(&engines, &expected, &set, interpolation, frames);
-            // At half a turn exactly either way round is as short.
+            // At exactly 180° both ways are equally short.
             for track in (0..set.track_count()).filter(|track| track % 8 != 7) {
                 let curve = ReferenceCurve::of(&interpolation, set.track(track));
                 let reference = curve.rotation(timeline.time(track, 0).unwrap());
@@ -1019,7 +1019,7 @@ fn few_times_of_each_track_have_the_bits_of_many() {
         set.push("", &times, &keys).unwrap();
     }
     give_key_data(&mut set, 84);
-    // In one window and group, and in many: of these some hold all of each of their tracks.
+    // Evaluated in one window and group, and in many; some of these contain their tracks whole.
     let small = |options: &mut EngineOptions| options.memory = Some(300_000);
     let staged = |options: &mut EngineOptions| stage(options, 2);
     let mut engines = vulkan_engines(|_| {});
@@ -1073,7 +1073,7 @@ fn few_samples_of_a_kept_clip_have_the_same_bits() {
         let (times, keys) = near_keys(&mut random, count, 0.5, step);
         set.push("", &times, &keys).unwrap();
     }
-    // On frames, and the last one far behind the others.
+    // These keys are on frames, and the last one is far after the others.
     let mut times: Vec<f64> = (0..700).map(|key| f64::from(key) / 250.0).collect();
     times.extend([3.001, 3e6]);
     let keys: Vec<Quat> = times.iter().map(|_| random.rotation().as_quat()).collect();

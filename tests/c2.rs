@@ -157,7 +157,7 @@ fn keys_at_which_the_acceleration_jumps_are_named() {
     let text = format!("jumps at {count} keys, the first is key {key}");
     assert!(found[0].to_string().contains(&text), "{}", found[0]);
     assert!(jump(&set, interpolation) > 1e-3);
-    // The shortest way round is an easy curve, and other methods have nothing to say.
+    // By the shorter way the curve is solvable, and other methods have no warning.
     assert_eq!(Interpolation::from(method::C2).warnings(&set), []);
     let other = Interpolation::from(method::BESSEL_OVERHAUSER).with_signs(KeySigns::AsAuthored);
     assert_eq!(other.warnings(&set), []);

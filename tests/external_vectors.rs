@@ -301,7 +301,7 @@ fn magnum_gltf_cubic_spline() {
         assert_near(found[i], expected[i], 1e-5);
         assert_near(nlerp(keys[0], keys[1], t), line[i], 1e-5);
     }
-    // As authored: their dot product is negative.
+    // The signs are as authored: the dot product is negative.
     let raw = Interpolation::from(method::NLERP).with_signs(KeySigns::AsAuthored);
     let found = evaluate(&set, raw, &[0.35, 0.8]);
     assert_near(found[0], line[0], 1e-5);
@@ -341,7 +341,8 @@ fn gltf_cubic_spline_without_tangents_takes_the_shorter_rotation() {
     for (found, expected) in found.iter().zip(&expected) {
         assert!(angle_between(*found, *expected) < 4e-7);
     }
-    // It eases: in the middle of an interval it is 1.5 times as fast as on the average.
+    // The curve eases in and out: in the middle of an interval it is 1.5 times as fast as on
+    // average.
     let engine = Engine::new(Device::Cpu).unwrap();
     let velocity =
         Interpolation::from(method::GLTF_CUBIC).with_quantity(Quantity::Velocity(Axes::Body));
@@ -355,7 +356,7 @@ fn gltf_cubic_spline_without_tangents_takes_the_shorter_rotation() {
     let found = verify(&engine, &set, method::GLTF_CUBIC.into(), &frames).unwrap();
     assert_eq!(found.verdict(), Verdict::ReferenceOnly, "{found:?}");
 
-    // As glTF specifies, keys with tangents keep their signs, and so do all if that is asked for: halfway from `p` to
+    // As glTF specifies, keys with tangents keep their signs; with `as-authored` all keys do. Halfway from `p` to
     // `-q` is `p - q`.
     let authored = Interpolation::from(method::GLTF_CUBIC).with_signs(KeySigns::AsAuthored);
     let halfway = (any_signs[0] + any_signs[1]).normalize();

@@ -55,7 +55,7 @@ fn results_have_the_recorded_hashes() {
     for case in 0..golden.case_count() {
         let name = golden.name(case);
         let recorded = Golden::recorded(name);
-        // A method has six cases: each is read by the next of `KERNEL_OPTIONS`.
+        // The options change with each case, and also with each method, which has six cases.
         for engine in widths.iter().chain(round_robin(&vulkan, case + case / 6)) {
             let found = golden.evaluate(case, engine).unwrap();
             assert!(found.bytes > 0, "{name}");

@@ -470,7 +470,7 @@ fn errors_name_the_option_and_the_value() {
         error.to_string(),
         "the bias NaN is out of range; give a number between -1e6 and 1e6, mostly within -1 and 1"
     );
-    // An empty set is no reason to accept it.
+    // It is refused for an empty set, too.
     let empty = TrackSet::new();
     assert!(
         cpu()
@@ -554,7 +554,8 @@ fn ends_of_a_mix_are_the_inputs() {
             .unwrap();
         output.map(|row| row.map(f32::to_bits))
     };
-    // `set` of another layer leaves the second at weight 1 of the first clip: it hides what is below.
+    // After `set` of another layer, the second layer still has the first clip at weight 1, so it hides
+    // the layers below.
     let expected = at(&cpu(), 1, Some(1));
     for engine in &engines {
         assert_eq!(at(engine, 0, Some(1)), expected, "{engine:?}");

@@ -100,7 +100,7 @@ fn assert_matches_the_original(set: &TrackSet, label: &str) {
         .into_iter()
         .filter(|method| ["slerp", "catmull-rom", "bessel-overhauser"].contains(&method.name))
     {
-        // The original takes keys as they are.
+        // The original program does not change the signs of keys.
         let interpolation = Interpolation::from(method).with_signs(KeySigns::AsAuthored);
         let rotations = engine
             .evaluate(set, interpolation, &SampleTimes::fps(25))

@@ -21,7 +21,7 @@ fn set(seed: u64, keys: usize) -> TrackSet {
     for track in 0..9 {
         let (mut times, mut quats) = (Vec::new(), Vec::new());
         let (mut time, mut rotation) = (random.between(-1.0, 1.0), random.rotation());
-        // One, two and more keys; some at whole frames.
+        // Tracks have one, two and more keys, some of which are at whole frames.
         for _ in 0..[1, 2, 3, keys][track.min(3)] {
             times.push(time);
             quats.push(rotation.as_quat());

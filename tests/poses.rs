@@ -81,7 +81,7 @@ fn a_blend_is_the_normalised_sum() {
             sum += rotation * (sign * f64::from(*weight));
         }
         let off = angle_between(found.as_quats()[i].as_dquat(), sum.normalize());
-        // A sign at a right angle is rounding's to choose.
+        // At a right angle, the sign depends on rounding.
         let doubtful = pairs
             .iter()
             .any(|(layer, _)| exact(layer, i).dot(first).abs() < 1e-6);
@@ -152,7 +152,7 @@ fn world_bits(poses: &WorldPoses) -> Vec<u32> {
 fn worlds_follow_their_parents() {
     let mut random = Random(5);
     let tracks = 64;
-    // Track 7 is a root; each other hangs from one that hangs already.
+    // Track 7 is the root; the parent of every other track is one that has its parent already.
     let mut order: Vec<usize> = (0..tracks).collect();
     order.swap(0, 7);
     for i in (2..tracks).rev() {

@@ -129,7 +129,7 @@ proptest! {
                 prop_assert_eq!(&found.indices, &all.vectors[0].indices);
             }
             prop_assert!(all.vectors[0].error <= 2.0 * tolerance, "{curve:?}");
-            // A channel that is together with none has the keys that it has alone.
+            // A channel that shares its keys with no other has the keys that it has alone.
             let single = [(samples.clone(), tolerance)];
             let single = reduce_together(&times, &single, &[], curve).unwrap();
             let alone = reduce_rotations(&times, &samples, tolerance, curve).unwrap();
@@ -161,7 +161,7 @@ fn what_needs_few_keys_gets_few() {
         let found = reduce_rotations(&times, samples, 1e-6, curve).unwrap();
         assert_eq!(found.indices, keys, "{curve:?}");
     }
-    // A cubic is one cubic.
+    // A cubic needs only its two end keys.
     let cubic: Vec<DVec3> = times
         .iter()
         .map(|&t| DVec3::new(t * t * t, t * t - t, 1.0 - 2.0 * t))
@@ -173,7 +173,7 @@ fn what_needs_few_keys_gets_few() {
         leaving.distance(DVec3::new(0.0, -1.0, -2.0)) < 1e-3,
         "{leaving}"
     );
-    // A joint that stands still has tangents of 0.
+    // The tangents of a joint that does not move are 0.
     let found = reduce_rotations(&times, &still, 1e-6, ReducedCurve::GltfCubic).unwrap();
     assert_eq!(
         found.tangents[0].map(|tangent| tangent.to_array()),

@@ -266,7 +266,7 @@ fn stopped_work_ends() {
         let ended = std::thread::scope(|scope| {
             let work = scope.spawn(|| {
                 stop.during(|| {
-                    // Again and again, so that the stop comes while something is evaluated.
+                    // Repeated, so that the stop comes during an evaluation.
                     loop {
                         engine.evaluate_into(&set, method::C2, &frames, layout, &mut output)?;
                     }
@@ -280,7 +280,7 @@ fn stopped_work_ends() {
         });
         assert!(matches!(ended, Err(Error::Stopped(_))), "{ended:?}");
     }
-    // Others' work goes on.
+    // The work of others continues.
     assert!(
         engine
             .evaluate(&set, method::SLERP, &SampleTimes::at(vec![0.0]))

@@ -134,7 +134,7 @@ fn velocities_have_one_length_and_go_on() {
                     } else {
                         let at = curve.acceleration(time);
                         let off = (v - curve.rotation(time) * at).length();
-                        // At a key it jumps.
+                        // At a key the acceleration jumps.
                         let jumps = |other: f64| {
                             (curve.acceleration(other) - at).length() > 0.05 * (1.0 + at.length())
                         };

@@ -162,7 +162,7 @@ fn parts_are_those_of_the_whole() {
                     .evaluate_bytes()
                     .unwrap();
                 for tracks in [0..5, 1..4, 2..2, 4..5] {
-                    // Aligned to 16 bytes, and not.
+                    // One slice is aligned to 16 bytes, the other is not.
                     for shift in [0, 4] {
                         let mut store = vec![Quat::IDENTITY; tracks.len() * track / 16 + 2];
                         let store: &mut [u8] = bytemuck::cast_slice_mut(&mut store);
@@ -279,7 +279,7 @@ fn parts_that_a_result_has_not_are_refused() {
 #[test]
 fn what_takes_too_much_memory_is_made_piece_by_piece_with_the_same_bits() {
     let mut set = hostile_set(11, 16);
-    // Long tracks, which are cut, beside many short ones.
+    // Long tracks, which are divided, and many short ones.
     let mut random = Random(12);
     for count in [350, 300] {
         let times: Vec<f64> = (0..count).map(|i| 0.01 * f64::from(i)).collect();

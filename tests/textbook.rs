@@ -144,7 +144,7 @@ fn velocity_is_the_derivative_of_the_rotation() {
     for method in moving() {
         let curve = curve(method, Ends::Natural, &times, &keys);
         for time in samples(&times).skip(1).take(198) {
-            // Not across a key, where acceleration jumps.
+            // The difference is not taken across a key, where the acceleration jumps.
             if times.iter().any(|key| (key - time).abs() < 2.0 * h) {
                 continue;
             }

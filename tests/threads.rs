@@ -193,7 +193,7 @@ fn calls(engine: &Engine) -> Vec<Call> {
             let found = engine.evaluate(set, method::BESSEL_OVERHAUSER, &frames(rate));
             sum(found.unwrap().as_quats())
         }),
-        // Straight from keys.
+        // This request is evaluated directly from keys.
         Box::new(move |rate| {
             let sparse = SampleTimes::at((0..20).map(|i| f64::from(i * rate) * 0.005).collect());
             let found = engine.evaluate(set, method::CATMULL_ROM, &sparse);
@@ -369,7 +369,7 @@ fn refused_threads() {
         assert_eq!(refused.count, 1000);
         assert!(refused.to_string().contains("RAYON_NUM_THREADS"));
     }
-    // Few are granted all the same.
+    // A small number of threads is granted nevertheless.
     let mut options = EngineOptions::default();
     options.thread_count = Some(2);
     // The thousand that were begun take a moment to end.

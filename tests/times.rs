@@ -195,7 +195,7 @@ fn accuracy_is_the_same_at_every_time() {
                 let interpolation = Interpolation::from(method)
                     .with_after(after)
                     .with_before(after);
-                // From before the keys until behind them.
+                // Samples from before the first key to after the last one.
                 let start = base - 0.75 + 1.0 / 4096.0;
                 let sampled = SampleTimes::rate(rate).between(start, start + 2.0);
                 let found = engine.evaluate(&set, interpolation, &sampled).unwrap();
@@ -338,7 +338,8 @@ fn frames_at_keys_of_unix_time_show_the_keys() {
         .evaluate(&set, method::STEP, &SampleTimes::fps(100))
         .unwrap();
     assert_eq!(found.as_quats(), keys);
-    // Behind a key by more than its rounding is not the key: 1.2 µs are 6e-5 rad here.
+    // A time that is after a key by more than its rounding is not at the key: here 1.2 µs are 6e-5
+    // rad.
     let times: Vec<f64> = (0..200)
         .map(|key| 1.7e9 + 0.01 * f64::from(key) + 1.2e-6)
         .collect();

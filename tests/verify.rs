@@ -108,7 +108,7 @@ fn half_turns_there_and_back_are_within_their_bounds() {
             let mut set = TrackSet::new();
             let times: Vec<f64> = (0..keys.len()).map(|i| i as f64).collect();
             set.push("", &times, &keys).unwrap();
-            // Between two inner half turns squad's controls are opposite to each other: it has no arc.
+            // Between two inner rotations by 180°, squad's controls are opposite, so there is no arc.
             let is_meant = |name: &str| keys.len() == 3 || name.starts_with("shoemake");
             for method in METHODS.into_iter().filter(|method| is_meant(method.name)) {
                 let found = verify(&engine, &set, method.into(), &SampleTimes::fps(25)).unwrap();

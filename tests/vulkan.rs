@@ -47,7 +47,7 @@ fn every_kernel_has_the_bits_of_its_twin_on_every_device() {
                 assert!(!check.remembered, "{check:?}");
                 checked.insert(check.name, check.total);
             }
-            // Now all of them are known, to other engines of this process as well.
+            // Now all results of the self-tests are known, also to other engines of this process.
             let engine = Engine::with_options(device.clone(), &options).unwrap();
             for check in engine.check_unknown_kernels().unwrap() {
                 assert!(check.remembered && check.total == 0, "{check:?}");
@@ -60,7 +60,7 @@ fn every_kernel_has_the_bits_of_its_twin_on_every_device() {
         let by_subgroups = has("_subgroup_rotations");
         let names: Vec<_> = tumble::vulkan::kernels().map(|(name, _)| name).collect();
         for &name in &names {
-            // A device that converts has no use for the other variant.
+            // A device that converts by its instruction does not use the other variant.
             let is_replaced = converts && names.contains(&&*format!("{name}_converting"));
             let can = (has_texels || !name.ends_with("_texels"))
                 && (converts || !name.ends_with("_converting"))
@@ -100,7 +100,7 @@ fn the_comparison_finds_a_driver_that_is_left_free() {
             let sum = &control.expressions[1];
             assert_eq!(sum.name, "re-association of a sum");
             assert!(sum.differing > 100, "{control:?}");
-            // One that is known to differ, and does not, has proved nothing.
+            // If a device that is known to differ does not differ, nothing is proved.
             let mut blind = control.clone();
             for expression in &mut blind.expressions {
                 expression.differing = 0;
@@ -147,7 +147,7 @@ fn the_validation_layer_has_nothing_to_say() {
             (options.reads, options.mapping) = (reads, mapping);
             options.memory = Some(1_000_000);
             let engine = Engine::with_options(device.clone(), &options).unwrap();
-            // Constants alone, and both forms.
+            // `step` has only constants; the other methods have the two forms.
             let methods = [method::STEP, method::SLERP, method::C2];
             for (round, method) in methods.into_iter().enumerate() {
                 if !is_due(round, variant / 3 + variant, KERNEL_OPTIONS.len()) {
@@ -259,7 +259,7 @@ fn assert_stays_in_application_buffer(mapping: Mapping) {
     use crate::application::ApplicationBuffer;
     let application = crate::application::Application::new();
     let engine = application.engine(mapping);
-    // With intervals so wild that the host computes their samples.
+    // Some intervals rotate so far that the host computes their samples.
     let mut set = hostile_set(4, 32);
     let about_x = |angle| glam::Quat::from_rotation_x(angle);
     let keys = [0.0, 3.0, 0.5, 2.5, 1.0].map(about_x);
@@ -278,7 +278,8 @@ fn assert_stays_in_application_buffer(mapping: Mapping) {
                 .encoding(encoding)
                 .evaluate_bytes()
                 .unwrap();
-            // Not at the start, and not at an alignment that devices prefer.
+            // The range does not begin at the start of the buffer, nor at an alignment that devices
+            // prefer.
             let offset = 5 * encoding.bytes() as u64;
             let size = expected.len() as u64;
             let (buffer, memory) = application.buffer(offset + size);

@@ -22,13 +22,14 @@ WORKS = {
     "smooth": "Smooth curves through the same keys",
     "one sample": "One sample of one track, ten thousand calls",
 }
-# Poses are asked for at two kinds of times, which are columns.
+# Poses are requested at two kinds of times; each kind is a column.
 POSES = {
     "one pose, slerp": "Slerp, or the library's curve between two keys",
     "one pose, smooth": "Smooth curves through the same keys",
 }
 TIMES = ("next time", "any time")
-# The largest difference from the first row: a contestant that differs by more does other work. Smooth curves differ.
+# The largest difference from the first row, for slerp: a contestant that differs by more does something else. Smooth
+# curves are not the same.
 SAME = 1e-3
 
 

@@ -15,9 +15,11 @@ import time
 import numpy
 from scipy.spatial.transform import Rotation, RotationSpline, Slerp
 
-# Of a contestant in one call of this program; the result is the median of several calls.
+# How often a contestant is measured in one call of this program; the result is the median of
+# several calls.
 ROUNDS = 1
-# SciPy makes a curve for each track in Python: of so many tracks, and the time is for all of them.
+# SciPy makes a curve for each track in Python. Therefore at most so many tracks are measured, and the
+# time is scaled to all of them.
 MAX_TRACKS = 512
 
 
@@ -74,7 +76,7 @@ def roma_slerp(times, keys, at):
         rows = torch.arange(len(times))[:, None]
         a, b = keys[rows, index], keys[rows, index + 1]
         b = torch.where((a * b).sum(-1, keepdim=True) < 0, -b, b)
-        # As roma writes it, for an amount of each pair's own.
+        # This is roma's own formula, with a separate amount for each pair.
         difference = roma.unitquat_to_rotvec(roma.quat_product(roma.quat_conjugation(a), b))
         return roma.quat_product(a, roma.rotvec_to_unitquat(t[..., None] * difference)).numpy()
 

@@ -477,7 +477,7 @@ fn devices_files_and_methods_are_found_or_named() {
         "100000 worker threads",
     );
     let mut file = null_mut();
-    // SAFETY: text, and room for the handle.
+    // SAFETY: the path is a text that ends in NUL, and `file` has room for the handle.
     let loaded = unsafe { tumble_file_load(c"no such.glb".as_ptr(), &raw mut file) };
     fails(loaded, TumbleResult::InvalidInput, "no such.glb");
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../data/pendulum.dat\0");
@@ -532,7 +532,7 @@ fn a_map_s_origin_is_reported() {
     .unwrap();
     let path = std::ffi::CString::new(file.to_str().unwrap()).unwrap();
     let mut file = null_mut();
-    // SAFETY: text, and room for the handle.
+    // SAFETY: the path is a text that ends in NUL, and `file` has room for the handle.
     let loaded = unsafe { tumble_file_load(path.as_ptr(), &raw mut file) };
     assert_eq!(loaded, TumbleResult::Ok, "{}", words());
     let mut origin = [1.0; 3];

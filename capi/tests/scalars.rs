@@ -35,7 +35,7 @@ fn scalars_have_the_engines_bits() {
                 tumble_set_push_scalar(set, name, times.as_ptr(), keys.as_ptr(), null(), 3)
             };
             assert_eq!(push(name.as_ptr(), &times), TumbleResult::Ok);
-            // Times that do not increase, and no name.
+            // Times that do not increase are refused, and so is a missing name.
             assert_eq!(push(name.as_ptr(), &[0.0; 3]), TumbleResult::InvalidInput);
             assert_eq!(push(null(), &times), TumbleResult::InvalidArgument);
         }

@@ -132,7 +132,7 @@ fn half_size_results_are_what_the_library_encodes() {
 #[test]
 fn standard_input_and_output_carry_data() {
     let folder = sample_folder();
-    // Standard input, although there is a file of this name.
+    // `-` is standard input, even if there is a file of this name.
     fs::write(folder.path().join("-"), "").unwrap();
     let quats = expected(&SampleTimes::fps(25), Layout::TrackMajor);
     let components = || bits(quats.iter().flat_map(Quat::to_array));
@@ -234,7 +234,7 @@ fn outputs_have_their_shapes_and_names() {
         ("transform", vec![3, 2, 10], "box1.tx".to_owned()),
         ("world", vec![3, 2, 7], "box1.px".to_owned()),
     ];
-    // Row by row and XYZ, as without options.
+    // Matrices are stored row by row and Euler angles are XYZ, the defaults.
     for encoding in Encoding::kinds() {
         if encoding.stores_rotations() && !encoding.is_quaternion() {
             let shape = [&[2, 3], encoding.shape()].concat();

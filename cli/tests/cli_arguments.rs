@@ -150,7 +150,7 @@ fn a_link_to_the_input_is_not_overwritten() {
         "folder",
         "--overwrite",
     ];
-    // One input's failure: the other result is made.
+    // One input fails; the result of the other is made.
     assert_eq!(run(folder.path(), &line).code, 3);
     assert!(folder.path().join("folder/b.npy").exists());
     assert_eq!(fs::read(folder.path().join("folder/c.npy")).unwrap(), input);

@@ -61,7 +61,7 @@ fn signals_stop_the_program_and_leave_no_file() {
     for (signal, code) in [("INT", 130), ("TERM", 143)] {
         let folder = sample_folder();
         fs::create_dir(folder.path().join("out")).unwrap();
-        // Some seconds of text.
+        // Writing this text takes some seconds.
         let line = ["eval", "a.dat", "--fps", "1000000", "-o", "out/o.csv"];
         let mut child = with_signals(env!("CARGO_BIN_EXE_tumble"))
             .current_dir(folder.path())

@@ -146,7 +146,7 @@ fn info_lists_the_bodies_and_joints_of_robots() {
     assert_eq!(info[0]["bodies"][2]["breadth_first"], 3);
     assert_eq!(info[0]["bodies"][1]["joints"][0]["axis"][2], 1.0);
     assert_eq!(info[1]["tracks"], 2);
-    // A fault is told with its line.
+    // The message about a fault has its line.
     std::fs::write(
         folder.path().join("bad.urdf"),
         "<robot>\n<link name='a'/><link name='b'/></robot>",
@@ -211,7 +211,7 @@ fn listings_say_what_there_is() {
     for shell in ["bash", "zsh", "fish", "powershell", "elvish"] {
         let script =
             String::from_utf8(succeed(folder.path(), &["completions", shell]).out).unwrap();
-        // clap completes values only for these.
+        // clap writes completions of values only for these shells.
         let values = ["bash", "zsh", "fish"].contains(&shell);
         assert!(script.contains("method"), "{shell} does not complete flags");
         assert!(
@@ -246,7 +246,7 @@ fn bench_reads_and_resamples_clips_of_every_format() {
         "{formats:?}"
     );
     for section in sections {
-        // Two clips of 22 joints, 240 frames at 30 a second: 479 at 60.
+        // Each of the two clips has 22 joints and 240 frames at 30 a second, so 479 at 60.
         assert_eq!(section["rotations"], 2 * 22 * 479, "{section}");
         assert!(
             section["file_bytes"].as_u64().unwrap() > 2 * 22 * 240 * 12,
@@ -365,7 +365,7 @@ fn bench_measures_every_workload_in_one_run() {
                 .collect();
             assert!(!resident.is_empty(), "{names:?}");
             for row in resident {
-                // By the device's clock, which is its first part.
+                // The time is measured by the device's clock; it is the first of the parts.
                 assert_eq!(row["parts"][0][1], row["milliseconds"], "{row}");
                 let share = row["share_of_device_write_rate"].as_f64().unwrap();
                 assert!(share > 0.0, "{row}");
@@ -420,7 +420,7 @@ fn an_acceleration_that_jumps_is_warned_of() {
         &["verify", "short.dat", "-m", "c2,squad", "--device", "cpu"],
         &["info", "short.dat"],
     ] {
-        // `verify` may find such velocities off their bounds, by any method.
+        // `verify` may fail: such velocities may exceed their bounds, whatever the method.
         let output = match line[0] {
             "verify" => run(folder.path(), line),
             _ => succeed(folder.path(), line),

@@ -93,11 +93,11 @@ fn commands_of_the_readme_work_in_a_clone() {
     assert!(lines.len() >= 2, "{lines:?}");
     for line in lines {
         let command = line.split('#').next().unwrap();
-        // There may be no browser here.
+        // `--open` would need a browser.
         let command = command.replace("--open", "-o page.html");
         let words: Vec<&str> = command.split_whitespace().collect();
         let run = crate::program::run(folder.path(), &words);
-        // `verify` says so where there is no Vulkan device.
+        // Without a Vulkan device, `verify` ends with the exit code 5.
         let is_done = run.code == 0 || words[0] == "verify" && run.code == 5;
         assert!(is_done, "{line}: {}", run.words);
     }
@@ -150,7 +150,7 @@ fn the_table_of_commands_is_that_of_the_program() {
     part.check();
 }
 
-/// Each option with its value, its default, its meaning and the commands that have it.
+/// Each option with its value, its default, its meaning and the commands that have it: a row for each meaning.
 #[test]
 fn the_table_of_options_is_that_of_the_program() {
     struct OptionRow {
@@ -159,7 +159,7 @@ fn the_table_of_options_is_that_of_the_program() {
         commands: Vec<String>,
     }
     let plain = |text: String| text.replace('|', "\\|").replace('<', "&lt;");
-    let mut rows: BTreeMap<String, OptionRow> = BTreeMap::new();
+    let mut rows: BTreeMap<String, Vec<OptionRow>> = BTreeMap::new();
     let program = tumble_cli::Arguments::command();
     let all = commands();
     let each = all.iter().map(|command| (command.get_name(), command));
@@ -168,36 +168,42 @@ fn the_table_of_options_is_that_of_the_program() {
             let Some(long) = option.get_long().filter(|_| !option.is_hide_set()) else {
                 continue;
             };
-            let row = rows.entry(long.to_owned()).or_insert_with(|| {
-                let short = option.get_short();
-                let short = short.map_or(String::new(), |letter| format!("`-{letter}` "));
-                let visible = option.get_visible_aliases().unwrap_or_default();
-                let aliases: String = visible
-                    .iter()
-                    .map(|alias| format!(" `--{alias}`"))
-                    .collect();
-                let takes_value = option.get_action().takes_values();
-                let value = option.get_value_names().filter(|_| takes_value);
-                let value = value.map_or(String::new(), |names| format!(" {}", names.join(" ")));
-                let is_shown = takes_value && !option.is_hide_default_value_set();
-                let defaults = option.get_default_values().iter().filter(|_| is_shown);
-                let defaults: Vec<_> = defaults.map(|value| value.to_string_lossy()).collect();
-                let default = match defaults.is_empty() {
-                    true => String::new(),
-                    false => format!(" [default: {}]", defaults.join(",")),
-                };
-                let help = option.get_help().unwrap_or_default();
-                OptionRow {
-                    names: plain(format!("{short}`--{long}{value}`{aliases}")),
-                    meaning: plain(format!("{help}{default}")),
-                    commands: Vec::new(),
-                }
-            });
-            row.commands.push(name.to_owned());
+            let short = option.get_short();
+            let short = short.map_or(String::new(), |letter| format!("`-{letter}` "));
+            let visible = option.get_visible_aliases().unwrap_or_default();
+            let aliases: String = visible
+                .iter()
+                .map(|alias| format!(" `--{alias}`"))
+                .collect();
+            let takes_value = option.get_action().takes_values();
+            let value = option.get_value_names().filter(|_| takes_value);
+            let value = value.map_or(String::new(), |names| format!(" {}", names.join(" ")));
+            let is_shown = takes_value && !option.is_hide_default_value_set();
+            let defaults = option.get_default_values().iter().filter(|_| is_shown);
+            let defaults: Vec<_> = defaults.map(|value| value.to_string_lossy()).collect();
+            let default = match defaults.is_empty() {
+                true => String::new(),
+                false => format!(" [default: {}]", defaults.join(",")),
+            };
+            let help = option.get_help().unwrap_or_default();
+            let names = plain(format!("{short}`--{long}{value}`{aliases}"));
+            let meaning = plain(format!("{help}{default}"));
+            let of_name = rows.entry(long.to_owned()).or_default();
+            let same = of_name
+                .iter_mut()
+                .find(|row| row.names == names && row.meaning == meaning);
+            match same {
+                Some(row) => row.commands.push(name.to_owned()),
+                None => of_name.push(OptionRow {
+                    names,
+                    meaning,
+                    commands: vec![name.to_owned()],
+                }),
+            }
         }
     }
     let mut table = String::from("| option | meaning | commands |\n|---|---|---|\n");
-    for row in rows.values() {
+    for row in rows.values().flatten() {
         let commands = row.commands.join(", ");
         writeln!(table, "| {} | {} | {commands} |", row.names, row.meaning).unwrap();
     }

@@ -298,7 +298,7 @@ fn joints_are_matched_by_name_and_parent() {
     for (line, says) in [
         (
             "compare one.bvh renamed.bvh",
-            "none of the same name (`hip` and `rig_hip` are near, but only equal names match)",
+            "none of the same name (`hip` and `rig_hip` are similar, but only equal names match)",
         ),
         (
             "compare one.bvh chain.bvh",
@@ -438,7 +438,8 @@ fn an_estimate_beside_its_reference() {
         assert_eq!(run.code, code, "{line:?}: {}", run.words);
         assert!(run.words.contains(says), "{line:?}: {}", run.words);
     }
-    // Sampled at the times of the other, in whichever second each begins.
+    // The second clip is sampled at the times of the first, although they count from different
+    // whole seconds.
     let at = [
         "eval",
         "estimate.tum",

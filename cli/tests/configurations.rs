@@ -44,7 +44,7 @@ fn verify_with(more: &[&str], driver: &str, methods: &str, environment: &[(&str,
     command
         .env("VK_DRIVER_FILES", driver)
         .env_remove("VK_ADD_DRIVER_FILES")
-        // It does not know the settings apart.
+        // The cache would return kernels of other settings.
         .env("MESA_SHADER_CACHE_DISABLE", "true")
         .envs(environment.to_vec());
     finish(command.output().unwrap())
@@ -57,8 +57,8 @@ fn lavapipe_gives_the_same_bits_at_every_width_and_number_of_threads() {
     }
     let widths = ["128", "256", "512"];
     let all = (1..=4).flat_map(|threads| widths.map(|width| (width, threads.to_string())));
-    // Each compiles every kernel anew. Every width and every number of threads is tried; with `SOAK`
-    // set, all with all.
+    // Each configuration compiles every kernel again. Therefore every width and every number of threads
+    // is tried once; with `SOAK` set, all pairs are tried.
     let is_all = std::env::var_os("SOAK").is_some();
     let tried = |(index, _): &(usize, _)| is_all || [0, 4, 8, 9].contains(index);
     let all: Vec<(&str, String)> = all
@@ -71,7 +71,7 @@ fn lavapipe_gives_the_same_bits_at_every_width_and_number_of_threads() {
             ("LP_NATIVE_VECTOR_WIDTH", *width),
             ("LP_NUM_THREADS", threads),
         ];
-        // All of both forms' kernels; methods differ on the host.
+        // These two methods use all kernels of both forms; other methods differ only on the host.
         let run = verify(LAVAPIPE, "slerp,c2", &environment);
         let output = String::from_utf8(run.out).unwrap();
         assert_eq!(run.code, 0, "{environment:?}: {output}{}", run.words);
@@ -112,7 +112,8 @@ fn a_driver_that_is_not_exact_is_named_and_refused() {
     let self_tests = ["contraction", "re-association of a sum"];
     let is_reported = |check| (run.words).contains(&format!("is not exact: self-test `{check}`"));
     assert!(self_tests.into_iter().any(is_reported), "{}", run.words);
-    // Used nevertheless, its results differ from the CPU's: code 6 is about the device, code 8 about results.
+    // If the device is used nevertheless, its results differ from the CPU's. Exit code 6 is about the device, 8
+    // about results.
     let run = verify_with(
         &["--allow-inexact"],
         LAVAPIPE,

@@ -24,7 +24,7 @@ fn the_program_says_of_every_fixture_what_is_expected() {
             let line = [
                 "eval",
                 name,
-                // Some begin as files of other formats do.
+                // Without it, some of them would be recognised as files of other formats.
                 "--from",
                 "dat",
                 "-o",

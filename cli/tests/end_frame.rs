@@ -296,7 +296,7 @@ fn frames_are_those_of_the_source() {
     );
     let (again, words) = frames("eval slow.tum --quantity quaternion -f 25 -o out.csv --overwrite");
     assert_eq!((again, words.contains("fps")), (51, false), "{words}");
-    // Device and reference are compared where no key is, too.
+    // Device and reference are also compared between the keys.
     let run = succeed(
         folder.path(),
         &"verify fast.tum --device cpu -m slerp --json"

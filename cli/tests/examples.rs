@@ -249,7 +249,7 @@ fn every_example_of_the_help_runs() {
         .collect();
     commands.retain(|command| *command != "help");
     assert!(commands.len() > 15, "{commands:?}");
-    // Stand-ins for the browser, and for programs that may not be installed.
+    // These replace the browser, and programs that may not be installed.
     for (name, text) in [
         ("tumble", format!("exec '{program}' \"$@\"")),
         ("xdg-open", String::new()),
@@ -279,7 +279,7 @@ fn every_example_of_the_help_runs() {
                 Some((_, Some(shorter))) => line += shorter,
                 None => {}
             }
-            // Inputs of some are results of others.
+            // Some examples read the results of others.
             let out = example.split(" -o ").nth(1);
             let out = out.and_then(|rest| rest.split_whitespace().next());
             let before = BEFORE.iter().find(|(start, _)| example.starts_with(start));

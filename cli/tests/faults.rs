@@ -290,7 +290,7 @@ fn absence_is_told_within_a_second() {
         r#"{{"file_format_version": "1.0.0", "ICD": {{"library_path": {library:?}, "api_version": "1.3.0"}}}}"#
     );
     fs::write(&crashing, manifest).unwrap();
-    // A manifest that is no JSON, and one that names a library of garbage.
+    // One manifest is not JSON; the other names a library that is not one.
     let [no_manifest, no_library] =
         ["garbage.json", "library.json"].map(|name| folder.path().join(name));
     fs::write(&no_manifest, "garbage").unwrap();

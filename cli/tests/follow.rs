@@ -129,7 +129,7 @@ fn other_formats_hold_the_same_poses() {
 #[test]
 fn paths_of_a_directory_get_a_file_each() {
     let folder = path_folder();
-    // b.csv has no times, and the batch goes on.
+    // b.csv has no times and fails; the batch continues.
     let some = run(
         folder.path(),
         &["follow", "paths", "-o", "poses", "--overwrite"],
@@ -321,7 +321,7 @@ fn a_low_pass_is_in_hz() {
                 .map(|number| number.parse().unwrap());
             numbers.collect::<Vec<f64>>()
         });
-        // Far from the ends, whose samples stay.
+        // These samples are far from the ends, where the filter leaves them unchanged.
         let middle: Vec<Vec<f64>> = rows.filter(|row| (2.0..6.0).contains(&row[0])).collect();
         let largest = |column: usize| {
             middle
@@ -374,7 +374,7 @@ fn what_cannot_be_smoothed_is_refused() {
         assert_eq!(run.code, code, "{line:?}: {}", run.words);
         assert!(run.words.contains(words), "{line:?}: {}", run.words);
     }
-    // A kernel that is wider than the track is none the worse for it.
+    // A kernel may be wider than the track.
     succeed(
         folder.path(),
         &[
@@ -398,7 +398,7 @@ fn a_path_on_a_map_is_followed_as_one_at_zero() {
         for i in 0..20 {
             let angle = f64::from(i) * 0.3;
             let at = [angle.cos() * 4.0, angle.sin() * 4.0, angle * 0.25];
-            // As many bits as an f32 has at 4, so that both files say the same points.
+            // Rounded to the bits of an f32 near 4, so that both files contain the same points.
             let at = at.map(|number| (number * 2f64.powi(20)).round() / 2f64.powi(20));
             let [x, y, z] = [0, 1, 2].map(|axis| at[axis] + origin[axis]);
             writeln!(text, "{},{x:?},{y:?},{z:?}", f64::from(i) * 0.5).unwrap();
@@ -435,7 +435,7 @@ fn a_path_on_a_map_is_followed_as_one_at_zero() {
         let off = (map - moved - f64::from(*zero)).abs();
         assert!(off <= 1e-6, "{index}: {map} {zero}");
     }
-    // Text has the digits, and clips of files do.
+    // All digits are kept in text, and in the clips of motion files.
     follow("map.csv", "map.out.csv", "tangent");
     let text = fs::read_to_string(folder.path().join("map.out.csv")).unwrap();
     let first = text.lines().nth(1).unwrap();

@@ -129,7 +129,8 @@ fn fixtures(format: &str) -> Vec<Vec<u8>> {
 fn formats() {
     for &format in FORMATS {
         let mut corpus = fixtures(format.name);
-        // Longer logs are cut, and a chunk that is cut is nothing.
+        // The fuzzer truncates long logs, and a truncated chunk cannot be read. Therefore logs
+        // without chunks are added.
         let logs = corpus.iter().filter(|file| file.starts_with(LOG));
         let unpacked: Vec<Vec<u8>> = logs.map(|log| unpacked(log)).collect();
         corpus.extend(unpacked);

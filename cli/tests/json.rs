@@ -25,7 +25,7 @@ fn faults(value: &Value, location: &str, found: &mut Vec<String>) {
         }
         Value::String(text) => {
             let words = text.split(|c: char| !c.is_ascii_alphanumeric());
-            // `TrackMajor` is a name in the source; `SwiftShader` is a driver.
+            // Names such as `TrackMajor` are of the source; `SwiftShader` is a driver.
             let is_camel = |word: &str| {
                 let capitals = word.bytes().filter(u8::is_ascii_uppercase).count();
                 let starts = word.starts_with(|c: char| c.is_ascii_uppercase());
@@ -35,7 +35,7 @@ fn faults(value: &Value, location: &str, found: &mut Vec<String>) {
             let camel = words
                 .clone()
                 .find(|word| is_camel(word) && !names.contains(word));
-            // Names that others have given.
+            // These are names of devices and sources, which are not ours.
             let is_name = location.contains("device") || location.ends_with(".source");
             let mark = MARKS.iter().copied().find(|mark| text.contains(mark));
             if let Some(mark) = mark.or(camel.filter(|_| !is_name)) {
@@ -125,7 +125,7 @@ fn records_have_the_assumed_rate_and_the_end_that_is_left_out() {
         (&chosen["quantity"], &chosen["method"]),
         (&"quaternion".into(), &"authored".into())
     );
-    // Manifests say it too, and records of results that are kept.
+    // Manifests contain these members too, and so do the records of kept results.
     record("eval a.dat b.dat --fps 7.3 -o out --json");
     let path = temporary.path().join("out/manifest.jsonl");
     let manifest = std::fs::read_to_string(&path).unwrap();

@@ -30,7 +30,7 @@ fn every_variant_has_the_bits_of_the_cpu() {
         "{page}"
     );
 
-    // With a second for measurements the ceilings are measured at least, and the rules decide with what there is.
+    // Within a second, at least the limits of the device are measured; the rules decide by the times that exist.
     let line = ["lab", "--time-limit", "1", "-o", "timed.json"];
     let timed = finish(with_driver(folder, LAVAPIPE, &line).output().unwrap());
     let page = String::from_utf8_lossy(&timed.out);
@@ -43,7 +43,7 @@ fn every_variant_has_the_bits_of_the_cpu() {
     assert!(counts[0] == 14 && counts[1] >= 3, "{page}");
     assert!(lab["row"] == 2 && lab["run_lanes"].as_array().unwrap().len() == 5);
 
-    // A proof with its lanes needs some, and another file is no report.
+    // `prove --lab` needs a report with numbers of lanes; other files are refused.
     std::fs::write(folder.join("no.json"), "{\"format\": \"tumble-proof\"}").unwrap();
     for (file, why) in [
         ("lab.json", "it has no `run_lanes`"),

@@ -325,7 +325,7 @@ fn an_animation_that_cannot_be_read_is_not_written_again() {
         "convert broken.gltf",
         "reduce broken.gltf --tolerance 1deg",
     ] {
-        let part = "the result would keep the animation that cannot be read; mend or remove it, or write another format";
+        let part = "the result would contain the animation that cannot be read; repair or remove it, or write another format";
         refused(folder, &format!("{command} -o out.glb"), part);
     }
 }
@@ -452,7 +452,7 @@ fn numbers_out_of_range_are_refused_with_the_range() {
     }
 }
 
-/// A joint of the input that nothing follows is named, and how far it rotates.
+/// A joint of the input without a partner is named, and how far it rotates.
 #[test]
 fn rotations_that_are_lost_are_said() {
     let temporary = tempfile::tempdir().unwrap();
@@ -475,7 +475,7 @@ fn rotations_that_are_lost_are_said() {
     let made = line(folder, "retarget tail.bvh --onto walk.bvh -o out.bvh");
     says(
         &made,
-        "warning[W917]: nothing follows 1 joint of the input; of these, `Tail` rotates by up to 30.0°, which is lost",
+        "warning[W917]: 1 joint of the input has no partner, so its rotations are lost; the largest is that of `Tail`, 30.0°",
     );
 }
 

@@ -116,7 +116,8 @@ impl Results {
         for word in &line {
             words.push(file(word).map_or_else(|| word.into(), PathBuf::into_os_string));
         }
-        // Between the keys, where curves differ: the frames of the source are its keys.
+        // At 25 frames a second, samples are between the keys, where curves differ; at the source's
+        // own rate they are at the keys.
         if !line.contains(&"--fps") && !line.contains(&"--times") {
             words.extend(["--fps".into(), "25".into()]);
         }
@@ -285,7 +286,7 @@ fn every_option_is_obeyed_somewhere() {
         let is_obeyed = inputs
             .iter()
             .any(|input| results.of(input, &[option]).is_some());
-        // These have an effect only beside the option that they refine.
+        // These have an effect only together with the option that they refine.
         let wanting = [
             "--sequence",
             "--major",
@@ -311,22 +312,22 @@ fn is_redundant(input: &str, option: &[&str], other: &[&str]) -> bool {
         ["--layout", "track"] | ["--order", "xyzw"] | ["--from", _] => true,
         ["--layout", "frame"] => are_frames,
         ["--order", "wxyz"] => has("csv"),
-        // BVH has no times; 18 intervals at 10 fps end on a frame.
+        // BVH has no times, so the end is a frame; 18 intervals at 10 fps also end at a frame.
         ["--end-frame", _] => has("bvh") || has("--override-fps"),
         // These files have quaternions whose signs continue.
         ["--signs", _] => input != "keys.dat",
-        // A clip of a thousandth of the length has one frame.
+        // With milliseconds, the clip has a thousandth of its length, so only one frame.
         _ if has("--time-unit") => true,
-        // Lines join the keys of the others.
+        // The keys of the other files are joined by slerp already.
         ["--method", "slerp"] => input != "keys.dat",
-        // Only keys.dat begins later.
+        // Only keys.dat begins after 0.
         ["--from-zero"] => input != "keys.dat",
-        // Up is y in glTF.
+        // In glTF, y points up already.
         ["--up-axis", "y"] => input == "walk.glb",
-        // Roots alone have no length between them.
+        // Without parents there is no offset that could be scaled.
         ["--scale", _] => has("--parents"),
-        // They are about cases that these files do not have: several animations, two keys at one
-        // time, no rate, rounded times, missing keys.
+        // These options are about cases that do not occur in these files: several animations, two
+        // keys at one time, no rate, rounded times, missing keys.
         ["--animation", _] | ["--duplicates", _] | ["--source-fps", _] | ["--raw-times"] => true,
         ["--bridge-gaps"] => true,
         _ => false,

@@ -40,7 +40,7 @@ impl Marks {
             numbers.chunks(2).map(|pair| (pair[0], pair[1])).collect()
         };
         let texts = || named("text").map(|text| (text, text.text().unwrap().trim()));
-        // Those of the other axis end where the panel begins; titles and names of axes are no numbers.
+        // Labels of the other axis end where the panel begins; titles and names of axes are not numbers.
         let middle = texts().filter(|(text, _)| text.attribute("text-anchor") == Some("middle"));
         Self {
             texts: texts().map(|(_, shown)| shown.to_owned()).collect(),
@@ -311,7 +311,7 @@ fn joints_that_do_not_turn_are_left_out_unless_they_are_chosen() {
     succeed(folder, &["plot", "--report", "a.dat", "-o", "report"]);
     let marks = Marks::of(&folder.join("report/a-speed.svg"));
     assert!(marks.says("joint3") && !marks.says("joint2"));
-    // A dimension is one that is chosen.
+    // A dimension that is named counts as chosen.
     succeed(
         folder,
         &["plot", "a.dat", "--dimension", "5", "-o", "one.svg"],
@@ -439,7 +439,7 @@ fn png_shows_the_same_picture() {
 #[test]
 fn a_report_has_every_figure_and_a_page_that_shows_them() {
     let temporary = sample_folder();
-    // Two files of one name: the directories tell them apart.
+    // The two files have the same name; their directories differ.
     fs::create_dir(temporary.path().join("b & c")).unwrap();
     fs::rename(
         temporary.path().join("b.dat"),
@@ -457,8 +457,8 @@ fn a_report_has_every_figure_and_a_page_that_shows_them() {
         .skip(1)
         .map(|rest| rest.split('"').next().unwrap())
         .collect();
-    // Two dimensions (a set of two boxes has no 16th: its last) by three methods and all,
-    // then speed, error and sphere.
+    // For each input: two dimensions (the 16th does not exist for two boxes, so the last one is
+    // drawn), each by three methods and by all of them, then speed, error and sphere.
     assert_eq!(shown.len(), 2 * (2 * 4 + 3));
     for address in &shown {
         let file = address.replace("%20", " ").replace("%26", "&");

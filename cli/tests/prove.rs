@@ -59,7 +59,8 @@ fn expect_proof(run: &Run, proof: &Value, name: &str) {
     assert!(number("/golden/cases") > 360, "{page}");
     assert_eq!(number("/golden/cases_compared"), number("/golden/cases"));
     assert!(number("/random/crowds") >= 1 && number("/random/values") > 10_000);
-    // Crowds and clips whose result stays on the device, in rows too; slower drivers may have no time for all.
+    // Rows of crowds whose results stay on the device are measured, too; slower drivers may not have enough time
+    // for all.
     let cases = proof["figures"]["cases"].as_array().unwrap();
     let rows = cases.iter().filter(|case| case["row_seconds"].is_f64());
     let crowds = rows.filter(|case| case["case"] == "crowd").count();
@@ -101,7 +102,7 @@ fn the_software_drivers_are_proved_and_compared() {
         assert!(page.contains(word), "{word}: {page}");
     }
 
-    // One bit of a digest, and the file that is there, are noticed.
+    // A digest that differs is found, and an existing file is not replaced.
     let text = std::fs::read_to_string(folder.join("two.json")).unwrap();
     let mut other: Value = serde_json::from_str(&text).unwrap();
     for digest in other["random"]["digests"].as_array_mut().unwrap() {

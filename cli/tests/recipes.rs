@@ -64,7 +64,7 @@ fn recipes_have_the_version_the_licence_and_the_description_of_cargo_toml() {
         .replace("@DESCRIPTION@", &description);
     let port: serde_json::Value = serde_json::from_str(&filled).unwrap();
     assert_eq!(port["license"], license.as_str());
-    // Nix reads the version; the names of its licences are its own.
+    // Nix reads the version from Cargo.toml; it has other names for the licences.
     let flake = recipe("nix/flake.nix");
     assert!(!flake.contains(&version) && flake.contains("version = manifest.version;"));
     assert_eq!(flake.matches(&description).count(), 1, "{description}");

@@ -100,7 +100,8 @@ fn a_gltf_keeps_all_but_its_keys() {
     for kept in ["meshes", "materials", "skins", "nodes", "scenes"] {
         assert_eq!(before[kept], after[kept], "{kept}");
     }
-    // The view of the image comes behind those of the old keys, which are left out.
+    // In the file, the image's view is after the views of the old keys, which the result does not
+    // have.
     let image = |file: &Path| -> Vec<u8> {
         let (bytes, found) = (fs::read(file).unwrap(), json(file));
         let bin = 28 + u32::from_le_bytes(bytes[12..16].try_into().unwrap()) as usize;
@@ -109,13 +110,15 @@ fn a_gltf_keeps_all_but_its_keys() {
         bytes[bin + number("byteOffset")..][..number("byteLength")].to_vec()
     };
     assert!(image(Path::new(fox)) == image(&folder.join("fox.glb")));
-    // The tangents of few cubics take more than they save, and that is said.
+    // If there are few cubics, their tangents take more memory than the removed keys; the message
+    // says so.
     let sizes = "fox.glb (162.9 kB → 164.0 kB), 1.2 kB more than the input";
     assert!(said.words.contains(sizes), "{}", said.words);
     let said = succeed(folder, &["reduce", fox, "-o", "lines.glb"]);
     let sizes = "lines.glb (162.9 kB → 144.9 kB)\n";
     assert!(said.words.contains(sizes), "{}", said.words);
-    // Rotations of 16 bits stand in the file beside all else, or in a new one, compressed.
+    // Rotations of 16 bits are written into a copy of the file with its other content, or into a
+    // new, compressed file.
     let bounds = ["--world", "--tolerance", "0.1001"];
     for (name, more) in [
         ("short.glb", &["--quantize"][..]),
@@ -140,7 +143,7 @@ fn a_gltf_keeps_all_but_its_keys() {
         .filter(|sampler| sampler["interpolation"] == "CUBICSPLINE")
         .count();
     assert!(cubics > 5, "{cubics} of {}", samplers.len());
-    // Arcs stay near between samples too, where the input has arcs.
+    // If the input has arcs, the error between samples is small, too.
     succeed(folder, &["reduce", fox, "-o", "arcs.glb"]);
     let line = [
         "compare",

@@ -155,7 +155,7 @@ fn frames_apng_and_gif_show_the_same_film() {
 fn boxes_hang_where_their_rotations_say() {
     let folder = sample_folder();
     let half = std::f32::consts::FRAC_1_SQRT_2;
-    // Both straight down; then the first turned a quarter about z, which carries the second.
+    // First both boxes point down; then the first is rotated by 90° about z and carries the second.
     let text = format!(
         "# 2 3\n0 1 0 0 0 1 0 0 0\n1 {half} 0 0 {half} 1 0 0 0\n2 {half} 0 0 {half} {half} 0 0 {half}\n"
     );
@@ -367,7 +367,7 @@ fn bones_are_where_joints_are() {
         height(left).abs_diff(height(right)) < 4,
         "{left:?} {right:?}"
     );
-    // The left leg turned a quarter about z points to the right, and hides nothing of the right one's foot.
+    // The left leg, rotated by 90° about z, points to the right and does not hide the right foot.
     let kicking = still("1");
     let (left, right) = (
         kicking.extent(ORANGE).unwrap(),
@@ -403,7 +403,7 @@ fn a_mesh_is_drawn_where_the_file_has_one() {
     let mesh = shown(&[]);
     assert!(covered(&mesh).unwrap() > 200 * 150 / 4);
     assert!(mesh.extent(GREEN).is_none(), "no bones");
-    // Other units make another mesh: the bones are left.
+    // In other units the file's mesh does not fit, so the bones are drawn.
     assert!(shown(&["--scale", "0.01"]).extent(GREEN).is_some());
 }
 

@@ -232,7 +232,7 @@ fn orders_are_stated_and_checked() {
         "zyxw",
     );
     line(folder, &format!("{read} --source-body-order breadth-first"));
-    // Stated beside the motion, names decide.
+    // If the file has the names of its joints, they decide the order.
     line(
         folder,
         &format!("{eval} --dialect beyondmimic --describe -o named.npz"),
@@ -266,7 +266,8 @@ fn joints_of_another_robot_are_refused() {
         "convert named.npz --robot fewer.xml --dialect gmr -o x.pkl",
         "left_elbow",
     );
-    // Other lengths: named joints are taken with a warning, those without names are in no known order.
+    // With other lengths of the limbs, joints with names are read with a warning; the order of joints
+    // without names is unknown.
     fs::write(
         folder.join("longer.xml"),
         ROBOT.replace("0.1 -0.3", "0.1 -0.4"),
@@ -297,7 +298,7 @@ fn joints_of_another_robot_are_refused() {
         folder,
         "convert take.csv --robot massless.xml --dialect beyondmimic --velocity-at origin -o z.npz",
     );
-    // Fewer columns than the robot has joints: the others rest.
+    // The file has fewer columns than the robot has joints; the other joints rest.
     let text = fs::read_to_string(folder.join("take.csv")).unwrap();
     let heading = "Frame,root_translateX,root_translateY,root_translateZ,root_rotateX,root_rotateY,root_rotateZ,\
                    left_elbow_dof\n";
@@ -530,7 +531,7 @@ fn commands_of_the_guides_run() {
             let parts: Vec<&str> = command.split_whitespace().skip(1).collect();
             if let Some(out) = parts.iter().position(|part| *part == "-o") {
                 let made = folder.join(parts[out + 1]);
-                // An input of the same name was made by a command before.
+                // A command before may have made an input of the same name.
                 if made.is_file() && !parts[..out].contains(&parts[out + 1]) {
                     fs::remove_file(made).unwrap();
                 }
@@ -579,7 +580,7 @@ fn scalars_are_evaluated_alone() {
     let joints = bodies["joint_pos"].last_chunk::<4>().unwrap();
     let joints = joints.map(|value| value as f32);
     assert_eq!(last, [&[50.0, 1.0], &joints[..]].concat());
-    // Without the robot the joints have numbers, and wrap as they are.
+    // Without the robot, joints are numbered, and their angles are not unwrapped.
     let run = line(
         folder,
         "eval take.csv --fps 10 --quantity scalar-accelerations -o a.csv",
@@ -777,7 +778,7 @@ fn files_of_other_programs_become_those_of_mjlab() {
         &format!("{eval} mjlab --velocities differences --robot {pico} -o peers.npz"),
     );
     let peers = arrays(&folder.join("peers.npz"));
-    // Their last row has a difference to one side alone.
+    // In the last row, the difference is one-sided.
     check(&peers, "peer50", Some(50), "body_lin_vel_w", 49);
     assert_eq!(peers["joint_pos"].len(), 51 * 13);
     // Files of these programs are read in their orders.

@@ -102,7 +102,7 @@ fn a_way_over_a_hill() {
             .count()
             == 2
     );
-    // To standard output, with a word about a start that is off the surface.
+    // The path goes to standard output; a message says how far the start is from the surface.
     let printed = succeed(
         folder,
         &[

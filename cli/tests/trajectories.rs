@@ -82,7 +82,8 @@ fn every_trajectory_becomes_every_other() {
         euroc.contains("\n1305031098700000000,1.25,2,3,0.8,0,0,0.6\n"),
         "{euroc}"
     );
-    // By its heading, whatever it is called; to a format, whatever the file is called.
+    // The input's format is recognised by its heading, whatever its name is; `--to` selects that of
+    // the output, whatever its name is.
     fs::rename(at.join("path.euroc"), at.join("data.csv")).unwrap();
     line(
         at,
@@ -110,7 +111,7 @@ fn every_trajectory_becomes_every_other() {
         let largest = found["ape"][of]["max"].as_f64().unwrap();
         assert!(largest < 1e-5, "{of}: {largest}");
     }
-    // Sampled at a rate, poses need no file of times, and the rate is reported.
+    // Poses that are sampled at a rate need no file of times; the message states the rate.
     let sampled = line(at, "eval path.tum --fps 20 -o path.kitti");
     assert!(
         sampled
@@ -226,7 +227,7 @@ fn times_in_gaps_are_left_out_held_or_refused() {
         ["1305031098.900000000 1.5", "1305031099.200000000 1.5"]
     );
     assert_eq!(held[4], "1305031099.300000000 2");
-    // Numbers alone, likewise.
+    // The same for a table of numbers.
     line(
         at,
         &format!("{eval} --in-gaps hold --quantity world -o held.csv"),
@@ -282,12 +283,12 @@ fn frames_and_listed_times_lie_in_gaps_too() {
     assert_eq!(held[3], ("3".to_owned(), "0.6".to_owned()));
     let refuse = format!("{eval} --fps 1 --in-gaps refuse -o no.csv");
     refused(at, &refuse, "2 of 6 times lie between keys");
-    // A file that is kept keeps all frames.
+    // In a copy of a file no frames can be left out.
     line(at, "convert gap.csv -o kept.glb");
     let kept = "eval kept.glb --max-gap 1.5 -m slerp -o no.glb";
     refused(at, kept, "leave out --max-gap, or write another format");
     assert!(!at.join("no.glb").exists() && !at.join("no.csv").exists());
-    // Without a frame in a gap they are the same frames.
+    // If no frame is in a gap, the result has the same frames.
     line(
         at,
         "eval gap.csv -m slerp --fps 3 --start 0 --end 1 --max-gap 1 -o with.csv",
@@ -421,7 +422,7 @@ fn times_of_the_file_may_be_asked_for() {
     let words =
         "from 1699999999 to 1700000001.25 s exceed the keys, 1700000000.25 to 1700000001.25 s";
     assert!(said.words.contains(words), "{}", said.words);
-    // Times near 0 are the file's.
+    // Times near 0 are those of the file, not seconds since 1970.
     fs::write(
         at.join("late.tum"),
         "5.25 0 0 0 0 0 0 1\n7.25 2 0 0 0 0 0 1\n",

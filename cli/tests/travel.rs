@@ -93,11 +93,11 @@ fn the_guide_s_pipe_leads_a_box_over_the_hill() {
         let off = hill.nearest(at).distance(at);
         assert!(off < 0.01, "{at} is {off} off the hill");
         let clear = rocks.nearest(at).distance(at);
-        // The route's clearance, less the rounding of its points. All of a box 0.6 long is nearer to its
-        // foot: the upper corners are √(0.3² + 0.18² + 0.24²) = 0.424 away.
+        // The route's clearance, minus the rounding of its points. No point of a box of length 0.6 is
+        // farther than this from its foot: the upper corners are √(0.3² + 0.18² + 0.24²) = 0.424 away.
         assert!(clear > 0.45 - 1e-5, "{at} is {clear} from a rock");
         let up = Quat::from_slice(&pose[3..]) * Vec3::Y;
-        // Ground of 40° at most, 5° for looking ahead.
+        // The ground has a slope of at most 40°; looking ahead adds at most 5°.
         assert!(up.y > 0.707, "{up} at {at} is not upright");
     }
 }
@@ -121,7 +121,7 @@ fn a_path_its_axes_and_a_box_are_rendered() {
         let count = coloured(columns);
         assert!(count > 300, "{count} pixels of boxes and axes");
     }
-    // Without axes and with a small body less is coloured, and the body moves.
+    // Without axes, only the small body is coloured, and it moves.
     let still = |start: &str, out: &str| {
         let line =
             format!("render road.csv --drawn-frames 0 --size 200x200 --start {start} -o {out}");
@@ -242,7 +242,8 @@ fn the_page_shows_paths_with_axes_and_a_body_that_moves() {
     let Some(mut page) = Page::open(&folder.path().join("view.html")) else {
         return;
     };
-    // One box and its roof, a curve with a bar between any two samples, 40 times three axes.
+    // In view are one box and its roof, a curve with a bar between every two samples, and three
+    // axes at 40 points.
     let found = page.value("tumble.inView()");
     let samples = page.value("tumble.state.input.samples").as_u64().unwrap();
     assert!(samples >= 121, "{samples}");

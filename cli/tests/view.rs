@@ -110,7 +110,7 @@ fn it_loads_alone_and_draws_boxes_that_move() {
     let (start, _) = page.pixels("#stage");
     page.value("tumble.seek(3.3)");
     let (later, width) = page.pixels("#stage");
-    // Boxes are colourful, ground and floor are not.
+    // Boxes are coloured; the background and the floor are grey.
     let colourful =
         |pixel: &&[u8; 3]| pixel.iter().max().unwrap() - pixel.iter().min().unwrap() > 60;
     for pixels in [&start, &later] {
@@ -126,7 +126,7 @@ fn it_loads_alone_and_draws_boxes_that_move() {
         "{different} pixels differ between two times"
     );
 
-    // It moves by itself, and stops.
+    // The button starts the animation and stops it.
     page.click("#play");
     page.wait("tumble.state.playing && tumble.state.time > 3.5");
     page.click("#play");
@@ -200,7 +200,7 @@ fn ghosts_and_pairs_are_drawn() {
     page.value("tumble.loaded().then(() => true)");
     let (ghost, _) = page.pixels("#stage");
     assert!(alone != ghost);
-    // The ghost shows its own method.
+    // The ghost is drawn by another method than the solid body.
     let (shown, ghost_shown) = (
         page.value("tumble.shown(0)"),
         page.value("tumble.shown(0, 1)"),

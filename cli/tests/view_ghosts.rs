@@ -96,7 +96,8 @@ fn ghosts_are_drawn_at_the_same_moment_by_their_own_skeletons() {
     assert!(words.starts_with("2 inputs, "), "{words}");
     let Some(mut page) = page else { return };
     assert_eq!(page.value("tumble.ghosts().join()"), "b.npz");
-    // The hand of each: the second file has the leg first. Halfway between two frames, and at a frame.
+    // Compares the hands of both files; in the second file the leg is first. One time is halfway between
+    // two frames, one is at a frame.
     for (time, degrees) in [
         (0.0, [0.0, 0.0]),
         (0.375, [15.0, 37.5]),
@@ -127,7 +128,7 @@ fn ghosts_are_drawn_at_the_same_moment_by_their_own_skeletons() {
     assert_eq!(said(&mut page, 2)[1], "furthest apart: 0.00°, 0.0000");
     page.value("tumble.seek(0.5)");
 
-    // Each is hidden by its own box.
+    // A checkbox for each input hides it.
     let counts = |page: &mut Page| page.value("JSON.stringify(tumble.inView())");
     assert_eq!(counts(&mut page), "[[3,1],[3,1]]");
     let (both, _) = page.pixels("#stage");
@@ -146,7 +147,7 @@ fn ghosts_are_drawn_at_the_same_moment_by_their_own_skeletons() {
     loaded(&mut page);
     assert!(page.pixels("#stage").0 == both);
 
-    // The other one is solid, at the same moment.
+    // Now the other input is the solid one, at the same time.
     page.choose("#box", "3");
     page.choose("#set", "1");
     loaded(&mut page);
@@ -171,7 +172,7 @@ fn clips_that_cannot_be_compared_are_drawn_and_named() {
     let hung = "compared in the world, because `hand` has the parent `arm` in a.bvh, \
                 but has the parent `hip` in hung.bvh";
     let other = "not compared: no joint has the same name in both \
-                 (`hip` and `Hip` are near, but only equal names match)";
+                 (`hip` and `Hip` are similar, but only equal names match)";
     for line in [
         format!("a.bvh and hung.bvh: {hung}"),
         format!("a.bvh and other.bvh: {other}"),
@@ -182,7 +183,8 @@ fn clips_that_cannot_be_compared_are_drawn_and_named() {
     assert!(words.lines().any(|found| found == span), "{words}");
     let Some(mut page) = page else { return };
     page.value("tumble.seek(0.5)");
-    // Relative to the parents the hands do not differ; the boxes of the chain are drawn beside the bones.
+    // Relative to their parents, the hands do not differ; the boxes of the chain are drawn next to the
+    // bones.
     assert_eq!(
         said(&mut page, 2),
         ["hung.bvh", "furthest apart: hand 20.00°, hand 1.3434", hung]
@@ -238,14 +240,14 @@ fn moments_are_those_of_the_files_clocks() {
         loaded(&mut page);
         page.wait("Math.abs(tumble.state.time - 2) < 0.0301");
     }
-    // Frames alone: the nearest one.
+    // Pages with frames only show the nearest frame.
     let (_, page) = open(at, "a.tum b.tum --frames-only --fps 10");
     if let Some(mut page) = page {
         page.value("tumble.seek(3)");
         let nearest = "its nearest frame, 0.0300 s later, furthest apart: 0.00°, body 100.0300";
         assert_eq!(said(&mut page, 2)[1], nearest);
     }
-    // No moment in common: one at a time.
+    // Inputs without a common time are shown one at a time.
     let (words, page) = open(at, "a.tum late.tum");
     let apart = "no time lies in both: a.tum from 1700000000 to 1700000004 s, \
                  late.tum from 1700000100 to 1700000104 s; \

@@ -116,7 +116,7 @@ fn methods_and_rates_that_were_not_written_have_the_program_s_bits() {
         let samples = number(&mut page, "tumble.state.input.samples");
         assert_eq!(samples > written, !rate.is_empty(), "{samples} at `{rate}`");
     }
-    // Back to the stored result, which has 16 bits.
+    // The empty choice returns to the stored result, which has 16 bits.
     page.choose("#rate", "");
     page.value("tumble.loaded().then(() => true)");
     assert_eq!(number(&mut page, "tumble.state.input.samples"), written);
@@ -165,7 +165,7 @@ fn pictures_between_frames_are_evaluated_at_their_own_times() {
             .starts_with("5.010 s, after sample "),
         "{clock}"
     );
-    // A picture that is played lies anywhere.
+    // While the animation is played, times need not be those of frames.
     page.click("#play");
     page.wait("!tumble.state.input.times.includes(tumble.state.time) && tumble.state.time > 5.1");
     page.click("#play");
@@ -181,7 +181,7 @@ fn without_its_engine_a_page_shows_what_was_written() {
     };
     let file = folder.path().join("view.html");
     let text = fs::read_to_string(&file).unwrap();
-    // A browser that runs no module: one that is broken.
+    // A damaged module stands for a browser that cannot run it.
     let start = text.find("\"engine\":\"").unwrap() + 40;
     let broken = [&text[..start], "AAAAAAAA", &text[start + 8..]].concat();
     assert!(whole.value("tumble.state.input.live !== null") == true);

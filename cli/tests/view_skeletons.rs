@@ -13,7 +13,7 @@ fn bones_of_a_bvh_file_are_where_eval_puts_its_joints() {
     let folder = temporary.path();
     fs::copy(root().join(BVH), folder.join("walk.bvh")).unwrap();
     let run = succeed(folder, &["view", "walk.bvh", "a.dat", "-o", "view.html"]);
-    // All, and the lines by which BVH joins its frames.
+    // All methods, and `authored`: BVH's frames are joined by slerp.
     assert!(
         run.words.contains(&format!(
             "2 inputs, authored and {} methods",
@@ -78,7 +78,7 @@ fn bones_of_a_bvh_file_are_where_eval_puts_its_joints() {
         }
     }
 
-    // Boxes beside it hang as a chain, without names.
+    // The boxes of the other input are drawn as a chain, and have no names.
     page.choose("#set", "1");
     page.value("tumble.loaded().then(() => true)");
     let name = "document.querySelector('#box-name').textContent";

@@ -1,4 +1,4 @@
-//! Features of motions that people train on, in f64 and with the same bits on every processor: rotations as six numbers,
+//! Features of motions for learning, in f64 and with the same bits on every processor: rotations as six numbers,
 //! headings, root motion, contacts, mirrored poses, the 263 numbers of HumanML3D, and Kimodo's.
 //! [docs/features.md](https://github.com/tumble-rs/tumble/blob/main/docs/features.md) has the formulas and their sources.
 

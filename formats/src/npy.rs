@@ -201,7 +201,7 @@ impl<W: Write> NpyWriter<W> {
     /// When flushing fails, or (`InvalidInput`) when there are fewer rotations than the shape has.
     pub fn finish(mut self) -> io::Result<W> {
         if self.missing > 0 {
-            let message = format!("{} rotations of the shape are missing", self.missing);
+            let message = format!("{} rotations of the result were not written", self.missing);
             return Err(io::Error::new(io::ErrorKind::InvalidInput, message));
         }
         self.writer.flush()?;

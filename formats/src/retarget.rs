@@ -80,7 +80,7 @@ pub struct RetargetReport {
     pub pairs: Vec<(String, String)>,
     /// Joints of the target that keep their rest rotations.
     pub resting: Vec<String>,
-    /// Joints of the source that nothing follows.
+    /// Joints of the source without a partner.
     pub dropped: Vec<String>,
     /// The dropped joint that rotates furthest from its rest pose, and this angle in degrees; `None` if all rest.
     pub furthest_dropped: Option<(String, f64)>,

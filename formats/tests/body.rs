@@ -68,7 +68,8 @@ fn what_is_no_model_of_the_body_is_refused() {
         |path: &Path, clip: &Motion| body_offsets(path, clip, Limits::default()).unwrap_err();
     let model = folder().join("models/SMPL_MALE.npz");
     assert!(body_offsets(&model, &clip, Limits::default()).is_ok());
-    // The motion itself; a gender that no file is of; more betas than the model has; no body at all.
+    // Refused: the motion itself as a model; a gender for which there is no file; more betas than the
+    // model has; a clip without a body.
     let fault = refused(&folder().join("male.npz"), &clip);
     assert_eq!(fault.code, Code::BodyModel);
     assert!(fault.message.contains("`v_template`"), "{fault}");

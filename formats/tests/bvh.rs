@@ -105,7 +105,7 @@ fn files_from_elsewhere_are_what_other_programs_read() {
     let cmu = open(&folder.join("cmu_01_01.bvh"));
     compare("cmu", &cmu, &json("cmu_01_01.expected.json"));
     assert_eq!(cmu.rate, FrameRate::new(120, 1).ok());
-    // Every `.bvh` of the folders was there.
+    // Every `.bvh` file of the folders was compared above.
     let files = ["", "made"].map(|part| fs::read_dir(folder.join(part)).unwrap());
     let files = files
         .into_iter()

@@ -77,7 +77,7 @@ const ANGLE_ORDER: EulerSequence = EulerSequence::XYZ;
 
 #[test]
 fn joints_are_written_below_their_parents_with_usable_names() {
-    // The third hangs on the fourth, which comes behind it.
+    // The parent of the third joint is the fourth, which comes after it.
     let parents = [None, Some(0), Some(3), Some(0), None];
     let names = ["hips", "left leg", "", "hips", "prop"];
     let mut rotations = vec![Quat::IDENTITY; 10];
@@ -231,7 +231,7 @@ fn rotation() -> impl Strategy<Value = Quat> {
     );
     prop_oneof![
         anywhere.prop_map(|q| DQuat::from_array(q).normalize().as_quat()),
-        // Near gimbal lock: a quarter turn about one axis between turns about others.
+        // Near gimbal lock: about 90° about one axis, between rotations about other axes.
         lock.prop_map(|(first, middle, a, b, near, down)| {
             let about_axis = |axis: usize, angle| match axis {
                 0 => DQuat::from_rotation_x(angle),

@@ -132,7 +132,7 @@ fn files_of_robots_hold_the_stored_numbers() {
     assert_eq!(library.clips[0].set.track_name(0), "root");
     let named = open("isaaclab_amp.npz");
     assert_eq!(named.clips[0].set.scalar(0).unwrap().name, "waist_yaw");
-    // The same with w first is known by the first line alone.
+    // The same layout with w first is recognised only by its first line.
     let path = layouts().unwrap().join("kimodo_qpos.csv");
     let codes =
         |loaded: &Loaded| -> Vec<Code> { loaded.warnings.iter().map(|it| it.code).collect() };
@@ -171,7 +171,7 @@ fn files_of_robots_hold_the_stored_numbers() {
         .flat_map(|key| key.as_dvec3().to_array())
         .collect();
     assert_eq!((found, set.track_count()), (stored, 22));
-    // Breadth first, with other joints in other places, and nothing that says so.
+    // The joints are breadth first, and nothing in the file says so; they are still counted.
     assert_eq!(open("beyondmimic.npz").clips[0].set.scalar_count(), 13);
 }
 
@@ -254,7 +254,7 @@ fn files_of_people_hold_the_stored_numbers() {
     let rotations = expected("exact30_body_quat_w");
     assert_eq!((clip.set.track_count(), clip.set.scalar_count()), (17, 4));
     assert_eq!(clip.scalar(0).kind, ScalarKind::Contact);
-    // z up, x forward, became y up, z forward.
+    // z up and x forward were converted to y up and z forward.
     let to_y_up = tumble::glam::DQuat::from_xyzw(-0.5, -0.5, -0.5, 0.5);
     for body in 0..17 {
         let found = positions(clip, body);
@@ -281,7 +281,7 @@ fn frames_of_deepmimic_are_its_joints() {
             let mut row = vec![0.0; width];
             row[0] = *duration;
             row[1..4].copy_from_slice(&[index as f64, 0.9, 0.25]);
-            // A quaternion of its number for each ball, and 1 for w of the others.
+            // Each ball has a rotation that depends on its number.
             for (ball, first) in [4, 8, 12, 16, 21, 25, 30, 35, 39].into_iter().enumerate() {
                 let angle = 0.1 * (ball + index) as f64;
                 row[first] = angle.cos();
@@ -393,7 +393,7 @@ fn files_of_joints_hold_the_stored_numbers() {
             "{scalar}"
         );
     }
-    // With the robot, names of motors are those of its joints, and what was commanded is left out.
+    // With the robot, motors get the names of its joints, and the commanded values are left out.
     let robot = shared_data().unwrap().join("robots/robots/pico.xml");
     let robot = Robot::open(&robot).unwrap();
     let mut episode = open("xr_teleoperate.json");
@@ -451,7 +451,7 @@ fn every_file_of_the_layouts_is_read() {
                 folders.push(path);
                 continue;
             }
-            // Values to compare with, and the description of a data set.
+            // These files have the expected values, and the description of a data set.
             if ["expected.npz", "info.json"].contains(&&*name) {
                 continue;
             }

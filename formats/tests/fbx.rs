@@ -75,7 +75,7 @@ fn clips_follow_the_curves_of_files() {
                     let t = exact(time).translation;
                     DVec3::new(t.x, t.y, t.z)
                 };
-                // Vectors are followed within a part of the largest number.
+                // For vectors, the tolerance is relative to the largest number.
                 let size = times.iter().map(|&time| at(time).length());
                 let size = size.fold(0.1, f64::max);
                 for (sample, &time) in times.iter().enumerate() {
@@ -200,7 +200,7 @@ fn nodes_become_a_skeleton_in_the_units_of_the_file() {
     let loaded = read(&fixture("walk"), &ReadOptions::default());
     let space = loaded.space.unwrap();
     assert_eq!((space.up, space.metres), (DVec3::Z, 0.01));
-    // glTF has a unit and an up axis of its own.
+    // glTF requires metres and y up.
     let warning = |format: &str| {
         let format = Format::named(format).unwrap();
         let warning = loaded.space_warning(format, "out");
@@ -411,14 +411,15 @@ fn depth_work_and_memory_are_limited() {
         ..ReadOptions::default()
     };
     assert_eq!(refused(&deep(900), &memory), Code::Memory);
-    // Nodes whose curves are followed as far as it goes, each of them through all layers.
+    // Following the curves of these nodes takes the most keys; each of them goes through all
+    // layers.
     let spin = fs::read_to_string(fixture("spin")).unwrap();
     let (mut objects, mut links) = (String::new(), String::new());
     for number in 2000..2030 {
         objects += &format!("\tModel: {number}, \"Model::\", \"LimbNode\" {{\n\t}}\n");
         links += &format!("\tC: \"OO\",{number},0\n\tC: \"OP\",11,{number}, \"Lcl Rotation\"\n");
     }
-    // Layers that move none of them cost nothing.
+    // Layers that move none of these nodes cost nothing.
     let layers = |count: u32, moves: bool| {
         let (mut objects, mut links) = (objects.clone(), links.clone());
         for number in 3000..3000 + count {
@@ -457,7 +458,7 @@ fn broken_files_are_refused() {
         let error = read_fbx(name, &bytes, &ReadOptions::default()).unwrap_err();
         assert_eq!(error.code, code, "{error}");
     }
-    // Any file that ends early, and any file with a bit turned.
+    // Truncated files, and files with a changed bit.
     for name in [
         "maya_anim_interpolation_7700_binary",
         "max2009_cube_anim_6100_binary",

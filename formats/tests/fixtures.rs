@@ -32,7 +32,7 @@ pub(crate) fn verdict(path: &Path) -> String {
             text = format!("refused\n{error}\n");
         }
     }
-    // With the separator of this system.
+    // The folder's name is removed with the separator of this system.
     text.replace(&folder.join("").display().to_string(), "")
 }
 

@@ -176,7 +176,8 @@ fn tracks_are_nodes_that_are_moved_or_carry_such() {
         clip.channels[1].rotation,
         Some(ChannelInterpolation::Linear)
     );
-    // The base stands still, turned, moved and doubled; its one key is at the clip's first time.
+    // The base does not move. It is rotated, translated and scaled by 2; its only key is at the
+    // clip's first time.
     let rest = clip.skeleton[0].rest;
     assert_eq!(
         (rest.translation, rest.scale),
@@ -269,7 +270,7 @@ fn limits_refuse_before_memory_runs_out() {
     let path = folder.path().join("long.glb");
     let mut file = File::create(&path).unwrap();
     file.write_all(b"glTF\x02\0\0\0").unwrap();
-    // A file of holes: it takes no room.
+    // The file is sparse, so it takes no disk space.
     file.set_len((1 << 32) + 8).unwrap();
     let refused = open_gltf(&path, &ReadOptions::default()).unwrap_err();
     assert_eq!(refused.code, Code::FileTooLong);
@@ -313,7 +314,7 @@ fn damaged() -> impl Strategy<Value = Vec<u8>> {
             let offset = index.index(bytes.len());
             bytes[offset] = byte;
         }
-        // Other numbers reach deeper than other letters.
+        // Changed numbers get further in the reader than changed letters.
         for (index, digit) in digits {
             let all = bytes
                 .iter()

@@ -76,7 +76,7 @@ fn view_bytes<'a>(glb: &'a Glb, json: &Value, index: u64) -> &'a [u8] {
         .find_map(|name| view["extensions"].get(name));
     let view = compressed.unwrap_or(view);
     let number = |name: &str| view[name].as_u64().unwrap_or(0) as usize;
-    // Data behind a URI that is kept is not in the file.
+    // The data behind a kept URI is in another file.
     match json["buffers"][number("buffer")].get("uri") {
         None => &glb.bin[number("byteOffset")..][..number("byteLength")],
         Some(_) => &[],
@@ -168,7 +168,7 @@ fn everything_but_the_samples_comes_back() {
             members(old_text.trim_start_matches('\u{feff}')),
             members(&new_text),
         );
-        // Meshes, skins and images name what may have other indices.
+        // Meshes, skins and images refer to objects whose indices may change.
         let renumbered = [
             "animations",
             "accessors",
@@ -216,7 +216,8 @@ fn everything_but_the_samples_comes_back() {
         let count = |json: &Value, list: &str| json[list].as_array().map_or(0, Vec::len);
         let unused = count(&before, "accessors") - distinct([&kept, &old_keys]).len();
         let still = count(&after, "accessors") - distinct([&now, &keys]).len();
-        // Its unknown extensions have numbers that may be indices: data that these may name stay.
+        // Numbers in the unknown extensions of this file may be indices, so the data that they may
+        // refer to is kept.
         let is_pinned = path.ends_with("keep_everything.gltf");
         assert!(
             unused == still || is_pinned,
@@ -278,7 +279,7 @@ fn check_clips(loaded: &Loaded, again: &[Motion], label: &str) {
         let rate = FrameRate::new(60, 1).unwrap();
         let times = times(&**document, clip, rate);
         let samples = sample(clip, times.clone());
-        // To the last bit where times are read as they are: see the next test.
+        // If times are read as they are stored, they are equal to the last bit (see the next test).
         let ends = |clip: &Motion| clip.set.time_span().unwrap();
         let (old, written) = (ends(clip), ends(new));
         let is_near = (old.0 - written.0).abs() <= 2e-7 && (old.1 - written.1).abs() <= 2e-7;
@@ -375,7 +376,7 @@ fn nothing_to_bake_is_the_same_file() {
         assert_eq!(warnings, []);
         assert!(bytes == fs::read(fixture(name)).unwrap(), "{name}");
     }
-    // Steps alone are nothing to bake either.
+    // A file that has only steps does not change either.
     let (bytes, _) = baked(&open(&fixture("step_scale.gltf")), 60, Path::new("/a.gltf")).unwrap();
     assert!(bytes == fs::read(fixture("step_scale.gltf")).unwrap());
 }
@@ -466,8 +467,8 @@ fn no_error_is_new_to_khronos_validator() {
         return;
     };
     for (paths, both) in pairs.chunks(2).zip(reports.chunks(2)) {
-        // The code and the pointer of each error, without indices: entries that nothing uses are left out, so that
-        // others have new ones. The error of a number names the number.
+        // The code and the pointer of each error, without indices, because unused entries are left out and the others
+        // get new indices.
         let errors = |report: &Report| -> Vec<String> {
             let cut = |error: &String| {
                 let pointer = error.split(": ").next().unwrap();

@@ -158,7 +158,7 @@ fn text_is_written_beside_its_files_alone() {
             .contains("/buffers/0/uri: error[E116]: `keys%20beside.bin`"),
         "{why}"
     );
-    // A file without others beside it may go anywhere.
+    // A file that refers to no other files may be written into any folder.
     written(
         &open(&fixture("cubic.gltf")),
         &other.path().join("cubic.gltf"),
@@ -215,7 +215,7 @@ fn buffers_without_a_uri_stay_such() {
     let mut none = file.clone();
     none["buffers"] = json!([unnamed]);
     none["bufferViews"] = json!([]);
-    // Zeros, which need no bytes: one key.
+    // Accessors without a buffer view are zeros; here they are one key.
     none["accessors"] = json!([
         {"componentType": 5126, "count": 1, "type": "SCALAR", "min": [0], "max": [0]},
         {"componentType": 5126, "count": 1, "type": "VEC3"},

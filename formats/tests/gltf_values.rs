@@ -23,7 +23,7 @@ fn numbers(value: &Value) -> Vec<f64> {
 fn error_of(clip: &Motion, json: &Value, channel: &Value) -> f64 {
     let track = track_of(clip, json, channel["node"].as_u64().unwrap() as usize);
     let mut times = numbers(&channel["times"]);
-    // Those at a key were rounded to 12 digits, which a step does not forgive.
+    // Times at keys were rounded to 12 digits; just before a key, a step has another value.
     let keys = keys_of(clip, track, channel["path"].as_str().unwrap());
     for time in &mut times {
         let key = keys.iter().find(|key| (**key - *time).abs() < 1e-9);
@@ -70,7 +70,7 @@ fn compare(folder: &Path, bound: f64, options: &ReadOptions) -> usize {
             let name = animation["name"].as_str().filter(|name| !name.is_empty());
             assert_eq!(clip.name.as_deref(), name, "{file}");
             for channel in animation["channels"].as_array().unwrap() {
-                // Beside a step even the smallest change of a time changes everything.
+                // Next to a step, the smallest change of a time changes the value.
                 if channel["interpolation"] == "STEP" && !options.raw_times {
                     continue;
                 }
@@ -146,7 +146,8 @@ fn quantized_keys_are_near_those_of_the_file_they_were_made_of() {
     assert_eq!(fox.clips.len(), 3);
     for (plain, other) in fox.clips.iter().zip(&quantized.clips) {
         assert_eq!(plain.name, other.name);
-        // Its last key comes between two frames of 24 fps, on one of 120 fps: that is not the rate of the keys.
+        // The last key of `Run` is between two frames of 24 fps and on one of 120 fps, which is not the rate of
+        // the keys.
         let is_even = plain.name.as_deref() != Some("Run");
         let rate = tumble::FrameRate::new(24, 1).ok().filter(|_| is_even);
         assert_eq!((plain.rate, other.rate), (rate, rate));

@@ -254,7 +254,7 @@ fn animations_of_one_skeleton_stay_of_one() {
             assert_eq!(same.keys, clip.set.track(moved).keys);
         }
     }
-    // Skeletons with other rest positions are other skeletons.
+    // Skeletons count as different if their rest positions differ.
     let mut other = loaded.clips[0].clone();
     other.skeleton[1].rest.translation = Vec3::X;
     let glb = written(
@@ -335,7 +335,7 @@ fn a_part_of_a_file_is_the_file_with_shorter_animations() {
         assert_eq!(found.channels, part.channels);
         for (track, other) in part.set.tracks().zip(found.set.tracks()) {
             assert_eq!(track.keys, other.keys);
-            // A joint that rests has only one key, which may be at another time.
+            // A joint that does not move has only one key, which may be at another time.
             let is_moved = track.keys.len() > 1;
             assert!(!is_moved || track.times == other.times, "{:?}", other.times);
         }
@@ -458,7 +458,7 @@ fn the_pelvis_of_a_body_is_at_both_its_places() {
         "{:?}",
         document.other_contents()
     );
-    // A copy has the same arrays, bytes and all.
+    // A copy has the same arrays, byte for byte.
     let mut copy = Vec::new();
     document
         .write(&[], &options, Path::new("o.npz"), &mut copy)

@@ -108,7 +108,7 @@ fn gaps_are_refused_or_bridged() {
         .map(|said| (said.code, said.count))
         .collect();
     assert_eq!(codes, [(Code::Bridged, 2)]);
-    // Long tables too; a track without any key, and times that are missing, stay refused.
+    // This works for long tables, too. A track without any key and missing times are still refused.
     let long = "time,track,x,y,z,w\n0,a,0,0,0,1\n0.1,a,,,,\n0.2,a,0,0,0.6,0.8\n0.1,b,0,0,0,1\n";
     let loaded = read(long, None, true).unwrap();
     let set = &loaded.clips[0].set;
@@ -208,7 +208,7 @@ fn columns_that_a_map_names_are_never_left_out() {
     assert_eq!(loaded.clips[0].set.track_count(), 2);
     let refused = read(both, Some("a=r..q:xyz"), false).unwrap_err();
     assert_eq!(refused.code, Code::ColumnTwice, "{refused}");
-    // The rows of several bodies are not one track.
+    // The rows of several bodies become several tracks.
     let bodies = "time,body,r,p,q\n0,a,0,0,0\n0,b,0,0,1\n1,a,0,0,2\n1,b,0,0,3\n";
     let loaded = read(bodies, Some("rotation=r..q:xyz"), false).unwrap();
     let set = &loaded.clips[0].set;
@@ -230,7 +230,7 @@ fn a_position_is_not_taken_for_a_quaternion() {
             format!("time,x,y,z,{x},{y},{z},w\n0,0,0,0.01,0,0,0,1\n1,0.05,0.02,0.01,0,0,0.6,0.8\n");
         let refused = read(&text, None, false).unwrap_err();
         assert_eq!(refused.code, Code::ColumnsAmbiguous, "{refused}");
-        // The message has the remedy.
+        // The `--map` of the message works.
         let (_, map) = refused.message.split_once("--map '").unwrap();
         let loaded = read(&text, map.strip_suffix('\''), false).unwrap();
         assert_eq!(loaded.warnings, []);

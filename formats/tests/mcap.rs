@@ -36,7 +36,7 @@ fn topics_and_pairs_of_frames_are_tracks() {
                 .ends_with("`/log` (std_msgs/msg/String)")
         );
         let clip = &loaded.clips[0];
-        // The first stamp of all is 0.5 s before the whole second that the others begin with.
+        // The first stamp is 0.5 s before the second with which the others begin.
         assert_eq!(clip.time_offset, 1_699_999_999);
         let of = |name: &str| {
             let index = clip.set.tracks().position(|track| track.name == Some(name));
@@ -64,7 +64,7 @@ fn topics_and_pairs_of_frames_are_tracks() {
             assert_eq!(keys, positions, "{name}");
             close(clip.set.track(of(name)).keys[3], 0.3);
         }
-        // The last message has the whole path.
+        // The last message of this topic contains the whole path.
         let (times, keys) = moved(of("/path"));
         assert_eq!(keys, positions);
         assert!((times[5] - times[0] - 0.25).abs() < 1e-9);

@@ -98,7 +98,7 @@ fn read_face(file: &Value) -> Loaded {
 
 /// The weights at a time, by the formulas of glTF's appendix C in f64.
 fn expected(time: f64) -> [f64; 5] {
-    // The key before, the key behind, and how far between them.
+    // The keys before and after a time, and where it is between them.
     let interval = |times: &[f32]| {
         let after = times.partition_point(|&key| f64::from(key) <= time);
         let (from, to) = (after.max(1) - 1, after.min(times.len() - 1));
@@ -227,7 +227,7 @@ fn a_part_of_an_animation_has_its_weights() {
     let clip = &again.clips[0];
     assert_eq!(clip.set.time_span(), Some((0.5, 1.5)));
     for index in 0..5 {
-        // The slopes before the first key and behind the last one do nothing.
+        // The slopes before the first key and after the last one have no effect.
         let [found, cut] = [clip, &part].map(|clip| clip.set.scalar(index).unwrap());
         assert_eq!((found.times, found.keys), (cut.times, cut.keys));
         assert_eq!(found.tangents.len(), cut.tangents.len());
@@ -267,7 +267,7 @@ fn weights_may_be_fractions_in_bytes_and_their_count_is_that_of_the_targets() {
         [keys(0), keys(1)],
         [vec![0.0, 0.2, 1.0], vec![1.0, 0.4, 0.8]]
     );
-    // One target more than there are values for.
+    // There is one target more than the values have.
     let targets = &mut file["meshes"][0]["primitives"][0]["targets"];
     targets.as_array_mut().unwrap().push(json!({}));
     let refused = read_face(&file).refused;

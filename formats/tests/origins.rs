@@ -79,7 +79,7 @@ fn a_map_s_positions_come_back_from_every_format() {
             format.write_clips(&sampled, &options, &mut bytes).unwrap();
             let file = folder.path().join(format!("a.{}", format.name));
             std::fs::write(&file, &bytes).unwrap();
-            // The rate is all that a format without times does not hold of such a clip.
+            // A format without times does not store the rate of such a clip.
             let source_rate = clip.rate.filter(|_| format.takes(FormatOption::TimesApart));
             let read = ReadOptions {
                 source_rate,
@@ -123,7 +123,7 @@ fn between_two_keys_of_a_map_lie_their_millimetres() {
         let off = pose.position - UTM - moved;
         assert!(off.length() < 1e-5, "{frame}: {off}");
     }
-    // Written, the keys have the digits that they had.
+    // Written again, the keys have the same digits.
     let samples = keyed(clip).unwrap();
     let mut bytes = Vec::new();
     let options = MotionOptions {
@@ -159,7 +159,7 @@ fn each_track_has_its_origin() {
         ],
         "select",
     );
-    // Scaled to kilometres and turned, they are where they were.
+    // Scaled to kilometres and rotated, the keys are at the expected points.
     let quarter = DQuat::from_rotation_x(std::f64::consts::FRAC_PI_2);
     let adjusted = adjust(clip, 0.001, quarter).unwrap();
     let expected = [

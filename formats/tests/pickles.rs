@@ -100,7 +100,7 @@ fn pickles_are_read_or_refused_as_python_would_have_them() {
         ("evil_eval", Code::PickleCalls),
         ("evil_getattr", Code::PickleCalls),
         ("evil_numpy", Code::PickleCalls),
-        // Its name is longer than it says, so that it is no pickle at all.
+        // Its name is longer than the stated length, so it is not a valid pickle.
         ("evil_dotted", Code::PickleDamaged),
         ("evil_build", Code::PickleDamaged),
         ("next_buffer", Code::PickleForm),
@@ -213,7 +213,7 @@ fn any_bytes_end_within_the_budget() {
 /// A value that is referred to a million times takes memory once; references that expand to too much are refused.
 #[test]
 fn references_are_shared_and_their_expansion_is_refused() {
-    // Each list holds the one before twice.
+    // Each list contains the list before it twice.
     let doubled = |times: usize| {
         let mut bytes = b"\x80\x02]\x94".to_vec();
         for index in 0..times {

@@ -230,7 +230,7 @@ fn steps_rests_and_scales_are_kept() {
         );
         assert_eq!(reduced.clip.channels[3].rotation, None);
         assert_eq!(set.track(3).keys, clip.set.track(3).keys);
-        // Sizes grow evenly.
+        // The scales change linearly, so two keys are enough.
         assert_eq!(set.vector_keys(Channel::Scale, 0).unwrap().times.len(), 2);
         assert!(reduced.keys[1] < reduced.keys[0] / 2, "{:?}", reduced.keys);
     }
@@ -300,7 +300,7 @@ fn rotations_of_16_bits_stay_within_the_bounds() {
         assert_eq!(again.set.track(3).keys, reduced.clip.set.track(3).keys);
         files.push(file);
     }
-    // So short a file is mostly text.
+    // A file as short as this one is mostly JSON, so only the order of the sizes is checked.
     assert!(sizes[1] < sizes[0] && sizes[2] < sizes[0], "{sizes:?}");
     for report in validate(&files).into_iter().flatten() {
         assert_eq!(report.errors, [] as [String; 0]);
@@ -318,7 +318,7 @@ fn rotations_of_16_bits_stay_within_the_bounds() {
             .all(|pair| pair[0] <= TENTH && pair[1] <= all.bounds[1])
     );
     assert_eq!(all.clip.set.track(0).times.len(), 90);
-    // Half a step of 16 bits is more than this.
+    // Half a step of 16 bits is larger than this tolerance.
     let fine = ReduceOptions {
         angle: 1e-5,
         quantize: Some(plain),

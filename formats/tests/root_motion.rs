@@ -133,7 +133,7 @@ fn extracted_motion_and_the_rest_are_the_motion() {
         let parents: Vec<_> = moved.skeleton.iter().map(|joint| joint.parent).collect();
         assert_eq!(parents, [Some(1), None, Some(0), Some(2)]);
         assert_same_world(&clip, &samples, (&moved, &extracted));
-        // The body goes nowhere, at its height, and faces heading 0.
+        // The body stays above the origin, at its height, and has heading 0.
         let (before, after) = (
             world(&clip, &samples).unwrap(),
             world(&still, &in_place).unwrap(),
@@ -144,7 +144,7 @@ fn extracted_motion_and_the_rest_are_the_motion() {
             assert!(off.length() < 1e-6, "{heading}: {off}");
             let left = heading.heading(is.rotation.as_dquat(), Ground::Y);
             assert!(left.abs() < 1e-6, "{heading}: {left}");
-            // Where the joint carries the root, the root has the samples of the motion in place.
+            // If the joint carries the root, the root has the samples of the motion in place.
             assert_eq!(
                 extracted.rotations[4 * frame + 2],
                 in_place.rotations[3 * frame + 1]

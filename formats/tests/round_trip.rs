@@ -197,7 +197,7 @@ fn through(
         Err(WriteError::Io(error)) => panic!("{error}"),
     };
     std::fs::write(&file, bytes).unwrap();
-    // The rate is all that a format without times does not hold of such a clip.
+    // A format without times does not store the rate of such a clip.
     let source_rate = rate.filter(|_| format.takes(FormatOption::TimesApart));
     let options = ReadOptions {
         source_rate,
@@ -327,7 +327,7 @@ fn compare(clip: &Motion, found: &Motion, warnings: &[Diagnostic], format: &Form
             let rests = clip.skeleton.iter().zip(&found.skeleton);
             for (track, (before, after)) in rests.enumerate() {
                 let is_kept = before.rest.translation == after.rest.translation
-                    // BVH without positions has the position of the joint there.
+                    // Without position channels, BVH stores the joint's position as its offset.
                     || format.name == "bvh" && clip.written_joints.is_empty();
                 assert!(is_kept, "{case}: {track}: {before:?} {after:?}");
             }
@@ -592,7 +592,8 @@ fn times_too_large_for_seconds_are_not_written_where_they_would_be_milliseconds(
                 _ => false,
             };
             assert_eq!(refused, expected, "{} {times_apart}", format.name);
-            // Whole nanoseconds, and arrays of seconds.
+            // These formats store whole nanoseconds or arrays of seconds, so large times are no
+            // problem.
             if ["euroc", "npz"].contains(&format.name) {
                 assert!(written.unwrap().is_empty());
                 let read = (format.read_bytes)("clip", bytes, &ReadOptions::default()).unwrap();

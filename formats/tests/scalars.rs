@@ -92,7 +92,7 @@ fn our_npz_keeps_scalars_with_names_kinds_and_limits() {
             .collect::<Vec<_>>()
     };
     assert_eq!(kinds(again), kinds(&clip));
-    // Other formats say that they cannot.
+    // Other formats warn that they cannot store scalars.
     for name in ["bvh", "glb", "tum"] {
         let format = Format::named(name).unwrap();
         let warnings = format.write_clips(&sampled, &MotionOptions::default(), &mut Vec::new());
@@ -210,7 +210,7 @@ fn smoothing_smooths_scalars() {
     let smoothed = job.run(&engine(), &clip).unwrap();
     let found = job.clip(&clip, &smoothed).unwrap();
     let knee = keys(&found, "knee").1;
-    // A quarter, a half, a quarter.
+    // The weights of the kernel are 1/4, 1/2, 1/4.
     assert_eq!(knee[1..3], [0.25, -0.125]);
     assert_eq!(keys(&found, "touch"), keys(&clip, "touch"));
 }
@@ -370,7 +370,7 @@ fn tables_store_scalars() {
             );
             let [found, stored] = [found, &clip].map(|clip| clip.scalar(index));
             assert_eq!(found.kind, stored.kind, "{}", format.name);
-            // Headings have no room for limits and interpolations.
+            // CSV has no place for limits and interpolations.
             if format.name != "csv" {
                 let rest = |it: Scalar| (it.limits, it.interpolation);
                 assert_eq!(rest(found), rest(stored), "{}", format.name);
@@ -414,7 +414,7 @@ fn maps_name_scalars() {
     );
     let missing = read("time,a\n0,1\n1,nan\n", "knee=a:scalar").unwrap_err();
     assert_eq!(missing.code, Code::NotFinite);
-    // A part of an array.
+    // A scalar may be a part of an array.
     let numbers: Vec<f32> = (0..6).map(|i| i as f32).collect();
     let mut array =
         b"\x93NUMPY\x01\x00\x46\x00{'descr': '<f4', 'fortran_order': False, 'shape': (2, 3), }"

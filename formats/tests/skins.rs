@@ -55,8 +55,8 @@ fn vertices_follow_their_joints_and_what_is_fixed_to_one() {
         .unwrap();
     let matrices = world_matrices(clip, &samples).unwrap();
     let joints = clip.set.track_count();
-    // At rest all is where the mesh has it, the pin on top of both bones; then the upper bone, which
-    // begins at a height of 1, lies on its side.
+    // At rest, the vertices are those of the mesh, with the pin on top of both bones. Then the upper
+    // bone, which begins at the height 1, is rotated by 90°.
     let at_rest = [[0.0, 0.0], [1.0, 0.0], [0.0, 2.0], [1.0, 2.0], [0.0, 2.0]];
     let bent = [[0.0, 0.0], [1.0, 0.0], [-1.0, 1.0], [0.0, 2.0], [-1.0, 1.0]];
     for (sample, expected) in [at_rest, bent].into_iter().enumerate() {
@@ -108,7 +108,7 @@ fn files_without_meshes_have_none_and_broken_ones_say_why() {
         let error = mesh(&read(&text.replace(from, to))).unwrap_err();
         assert!(error.contains(words), "{to}: {error}");
     }
-    // A clip whose tracks were chosen without the joints.
+    // The tracks of the clip were selected without the joints of the skin.
     let document = read(&fixture()).document.unwrap();
     let error = document.carried_mesh(&Motion::default()).unwrap_err();
     let words = "the joint root of the skin is not a track of the clip";

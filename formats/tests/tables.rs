@@ -70,7 +70,7 @@ fn a_row_for_each_key_is_read_whatever_packs_it_and_in_any_order() {
                 "{name}: {track_name}"
             );
         }
-        // The first key of all, one in the middle and the last, bit for bit.
+        // The first key, one in the middle and the last one are equal bit for bit.
         let keys = [
             (
                 "hip",
@@ -149,7 +149,7 @@ fn episodes_are_clips_and_parts_of_lists_are_tracks() {
     let second = &loaded.clips[1];
     let (times, hand) = track(second, "hand");
     assert_eq!((times[0], times[19]), (0.0, 19.0 / 30.0));
-    // Row 49: numbers 3 to 6 of the list, and 0 to 2.
+    // The values of row 49: the numbers 3 to 6 of the list, and 0 to 2.
     assert_eq!(
         hand[19],
         Quat::from_xyzw(-0.614_580_7, 0.670_267_3, 0.149_022_85, 0.388_361_36)
@@ -160,7 +160,7 @@ fn episodes_are_clips_and_parts_of_lists_are_tracks() {
         .unwrap()
         .keys[19];
     assert_eq!(moved.to_array(), [-0.611_278_3, 0.151_563_84, 1.233_337_5]);
-    // Row 30, w first.
+    // The values of row 30, with w first.
     let tool = track(second, "tool").1[0];
     assert_eq!(
         tool,

@@ -66,7 +66,7 @@ fn a_path_at_unix_times_keeps_every_digit() {
     assert_eq!((clip.time_offset, clip.rate), (1_305_031_098, None));
     let track = clip.set.track(0);
     assert_eq!((track.name, track.times[0]), (Some("body"), 0.6659));
-    // 1305031128.7555, of which f64 has 1305031128.7555001.
+    // The file has 1305031128.7555; the nearest f64 is 1305031128.7555001.
     assert_eq!(track.times[2999], 30.7555);
     let again = written(clip);
     let lines = text.lines().filter(|line| !line.starts_with('#'));
@@ -129,7 +129,7 @@ fn times_on_frames_are_frames_of_a_rate() {
     let clip = read("7.04 0 0 0 0 0 0 1\n7.08 0 0 0 0 0 0 1\n8 0 0 0 0 0 0 1\n");
     assert_eq!((clip.time_offset, clip.rate), (0, rate));
     assert_eq!(clip.set.track(0).times, [176.0 / 25.0, 177.0 / 25.0, 8.0]);
-    // Far from 0 they are counted from a second.
+    // Large times are counted from a whole second.
     let clip = read(
         "1700000007.04 0 0 0 0 0 0 1\n1700000007.08 0 0 0 0 0 0 1\n1700000008 0 0 0 0 0 0 1\n",
     );

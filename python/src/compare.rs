@@ -561,12 +561,12 @@ fn of_clips(
 /// numbers are the same as those of the program `evo`.
 ///
 /// Both clips have one track, or `track` selects one. They are compared at the times of the clip with fewer poses,
-/// where the other is interpolated by lines and arcs; `associate="nearest:0.01"` takes its nearest pose within 0.01 s,
-/// as evo does. The estimate is aligned to the reference by `align`: "position" translates it, "yaw" also rotates it
-/// about z, "se3" about any axis, "sim3" also scales it. Absolute errors are computed for each pose. `rpe` adds
+/// where the other is interpolated by lines and arcs; `associate="nearest:0.01"` takes its nearest pose within 0.01
+/// s, as evo does. The estimate is aligned to the reference by `align`: "position" translates it, "yaw" also rotates
+/// it about z, "se3" about any axis, "sim3" also scales it. Absolute errors are computed for each pose. `rpe` adds
 /// relative errors over steps of a time or a length: "1s", "0.5m". `max_gap`: poses between two that are more than
-/// this many seconds apart are not interpolated. Gaps, and positions that do not determine the rotation of the
-/// alignment, are warned of.
+/// this many seconds apart are not interpolated. A warning reports gaps, and positions that do not determine the
+/// rotation of the alignment.
 ///
 /// >>> import numpy as np, tumble
 /// >>> path = np.random.default_rng(1).normal(size=(9, 3))

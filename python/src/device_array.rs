@@ -21,7 +21,7 @@ use crate::output::{array_of, filled_bytes, type_name};
 /// that imports it waits for the card; your Python code does not. All imported tensors share its memory, which is freed
 /// after the last of them.
 ///
-/// Results of a motion library on a device that CUDA does not have are in memory of the host: software devices write
+/// Results of a motion library on a device that CUDA does not see are in the host's memory: software devices write
 /// them there, and other cards copy them there. `numpy.from_dlpack` imports them without a copy, too.
 ///
 /// >>> import tumble, torch  # doctest: +SKIP

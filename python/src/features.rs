@@ -1,4 +1,4 @@
-//! `tumble.features`: numbers that people train on, of arrays.
+//! `tumble.features`: features for learning, computed from arrays.
 
 use glam::{DQuat, DVec3};
 use numpy::{Element, PyArray1, PyArrayMethods};

@@ -20,17 +20,18 @@ use crate::run::interruptible;
 /// `target`: a clip with the skeleton. Joints are paired by the parts of the body that their names mean (VRM, Mixamo,
 /// SMPL, LAFAN1, CMU, Xsens, Unreal, SOMA), or by `bones`, a dict of names of the target's joints to those of the
 /// source's. `rest`: "same" if both skeletons rest in the same pose, "directions" to turn the limbs of the target to
-/// the directions of the source's, "auto" for that where they differ by more than 5 degrees. `rest_frame`: the index of
-/// the key of the source whose pose is its rest pose, such as a T-pose in which takes begin. `scale`: the factor for
-/// the hips' translations: "hips" for the ratio of their heights, "legs" for that of the lengths of the legs, or a
-/// number. `axes`: the rotation x y z w from the axes of the source to those of the target, else it is found from where
-/// hips, head and legs are.
+/// the directions of the source's, "auto" to do this only if a direction differs by more than 5 degrees.
+/// `rest_frame`: the index of the key of the source whose pose is its rest pose, such as a T-pose in which takes
+/// begin. `scale`: the factor for the hips' translations: "hips" for the ratio of their heights, "legs" for that of
+/// the lengths of the legs, or a number. `axes`: the rotation x y z w from the axes of the source to those of the
+/// target; by default it is derived from the positions of hips, head and legs.
 ///
 /// Rotations away from the rest pose are the same in the world. Times are the source's. Joints without a partner keep
-/// their rest rotations, and translations of others than the hips are lost. The report is a dict: `pairs`, `resting`,
-/// `dropped`, `furthest_dropped` (the one of these that rotates furthest from its rest, and the degrees, or None),
-/// `aligned` (degrees by joint), `scale`, `axes`, `axes_assumed`, `dropped_translation`, `largest_difference`
-/// (rad, of rounding), `ends` (how far hands and feet come away from the source's, in heights of the hips), `below_ground`.
+/// their rest rotations, and translations of joints other than the hips are lost. The report is a dict: `pairs`,
+/// `resting`, `dropped`, `furthest_dropped` (the one of these that rotates furthest from its rest, and the degrees,
+/// or None), `aligned` (degrees by joint), `scale`, `axes`, `axes_assumed`, `dropped_translation`,
+/// `largest_difference` (rad, of rounding), `ends` (how far hands and feet come away from the source's, in heights of
+/// the hips), `below_ground`.
 ///
 /// >>> import tumble
 /// >>> keys = [[[0, 0, 0, 1], [0, 0, 1, 0]], [[0, 0, 0, 1], [0, 0, 0, 1]]]

@@ -1,4 +1,5 @@
-//! Work that Ctrl-C ends: it is done by a thread of its own, while this one looks for signals.
+//! Work that Ctrl-C can end: a separate thread does it, while the calling thread checks for
+//! signals.
 
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError};
 use std::thread;
@@ -88,8 +89,8 @@ pub(crate) fn interruptible<T: Send + 'static>(
     })
 }
 
-/// As [`interruptible`], for work that borrows what it works on: it is waited for in any case. Without the
-/// GIL it is called.
+/// As [`interruptible`], for work that borrows its data; therefore it always waits until the work has ended.
+/// Call it without the GIL.
 pub(crate) fn stoppable<T: Send>(work: impl FnOnce() -> PyResult<T> + Send) -> PyResult<T> {
     let stop = Stop::new();
     let flag = stop.clone();

@@ -244,7 +244,7 @@ impl Record {
         self.record.is_whole()
     }
 
-    /// The identity of the shard's plan.
+    /// The SHA-256 that identifies the shard's plan.
     #[getter]
     fn plan(&self) -> &str {
         self.record.plan()

@@ -114,7 +114,7 @@ fn a_sheet_with_a_back_is_one_sheet() {
         [MeshWarning::Doubled { count: 2, face: 1 }]
     );
     near(length(&mesh, [0.5, 0.25, 0.0], [1.25, 0.25, 0.0]), 0.75);
-    // Polygons that go round the other way and begin elsewhere.
+    // Two equal polygons of opposite winding, which begin at different corners, are merged.
     let text = "v 0 0 0\nv 2 0 0\nv 2 2 0\nv 0 2 0\nf 1 2 3 4\nf 3 2 1 4\n";
     let mesh = of_obj(text);
     assert_eq!(mesh.triangles().len(), 2);
@@ -168,7 +168,7 @@ fn valid_obj_is_read() {
     let continued = of_obj("v 0 0 0\nv 1 -3 0\nv 2 \\\n0 0\nv 1 3 0\nf 1 2 \\\r\n 3\nf 1 3 4");
     assert_eq!(continued.triangles().len(), 2);
     near(length(&continued, [1.0, -2.0, 0.0], [1.0, 2.0, 0.0]), 4.0);
-    // A corner in the middle of a side, wherever the face begins.
+    // A corner may be in the middle of a side, at any corner with which the face begins.
     for face in ["1 2 3 4", "2 3 4 1", "3 4 1 2", "4 1 2 3"] {
         let mesh = of_obj(&format!("v 0 0 0\nv 1 0 0\nv 2 0 0\nv 0 2 0\nf {face}\n"));
         assert_eq!(mesh.triangles().len(), 2);

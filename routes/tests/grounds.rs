@@ -42,7 +42,7 @@ fn ways_round_a_disc_are_free_and_nearly_shortest() {
         let ground = Ground::new(&plain, clear(&rock, finest)).unwrap();
         let route = ground.mesh.route(from, to, By::Exact).unwrap();
         let over = route.length - shortest;
-        // A step round the hole goes out by about the finest edge.
+        // Going around the hole adds about the length of the finest edge.
         assert!(
             over > 0.0 && over < 3.0 * finest && over < before,
             "{finest}: {over}"
@@ -148,7 +148,7 @@ fn what_cannot_be_is_refused() {
     assert!(matches!(with(f64::NAN, 1.0), GroundError::Clearance { .. }));
     assert_eq!(with(1.0, 0.0), GroundError::Finest { finest: 0.0 });
     assert_eq!(with(9.0, 1.0), GroundError::Nothing);
-    // A start within the clearance, and one beside the ground, which is moved onto it.
+    // A start within the clearance is refused; a start next to the ground is moved onto it.
     let ground = Ground::new(&plain, clear(&rock, 0.1)).unwrap();
     let goal = dvec3(2.0, 0.0, 0.0);
     let error = ground
@@ -160,7 +160,7 @@ fn what_cannot_be_is_refused() {
         .route(dvec3(-2.0, 0.0, 5.0), goal, By::Exact)
         .unwrap();
     assert_eq!(route.off, [5.0, 0.0]);
-    // A clearance that closes the whole width parts the ground.
+    // A clearance as wide as the ground divides the ground.
     let corners = [
         dvec3(0.0, -4.0, 0.0),
         dvec3(0.0, 4.0, 0.0),

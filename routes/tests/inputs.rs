@@ -74,7 +74,7 @@ fn faces_of_no_area_are_left_out() {
 
 #[test]
 fn polygons_seams_and_what_is_unused() {
-    // One quad, of positions that are there twice, with one unused.
+    // A quad whose positions occur twice, and an unused position.
     let positions = [CORNERS.as_slice(), &[DVec3::Z], &CORNERS].concat();
     let mesh = of(&positions, &[&[0, 1, 2, 3], &[1, 5, 6], &[6, 7, 8]]);
     assert_eq!(mesh.positions().len(), 4);
@@ -89,7 +89,7 @@ fn polygons_seams_and_what_is_unused() {
         mesh.warnings(),
         [MeshWarning::NotFlat { count: 1, face: 0 }]
     );
-    // A seam is no boundary: -0 is 0.
+    // A seam between 0 and -0 is not a boundary.
     let seam = [
         DVec3::ZERO,
         DVec3::X,
@@ -213,7 +213,7 @@ fn starts_and_goals() {
     assert_eq!(error, RouteError::OtherPiece { start: 4, goal: 2 });
     let error = mesh.route(DVec3::NAN, goal, By::Exact).unwrap_err();
     assert!(matches!(error, RouteError::NotFinite { .. }));
-    // Both within one triangle, one on its edge, one at a corner.
+    // Points within a triangle, on its edge and at a corner.
     let inside = [
         dvec3(0.7, 0.2, 0.0),
         dvec3(0.9, 0.3, 0.0),

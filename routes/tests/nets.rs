@@ -74,7 +74,7 @@ fn places_are_found_again() {
             let uv = dvec2(random.f64(), random.f64());
             let found = net.nearest(net.at(uv));
             assert!((found.uv - uv).length() < 1e-10, "{uv} {found:?}");
-            // From outside: straight away from the surface.
+            // From a point outside, along the normal.
             let found = net.nearest(net.at(uv) + 0.01 * net.normal(uv));
             assert!((found.uv - uv).length() < 1e-10, "{uv} {found:?}");
             assert!((found.distance - 0.01).abs() < 1e-12);

@@ -27,7 +27,7 @@ fn assert_length(mesh: &Mesh, from: DVec3, to: DVec3, by: By, expected: f64, bou
             .map(|pair| pair[0].distance(pair[1]))
             .sum();
         assert!((sum - route.length).abs() <= 1e-12 * expected);
-        // Back again, greedy may find another route.
+        // In the other direction, the greedy search may find another route.
         if by == By::Greedy {
             break;
         }
@@ -59,7 +59,7 @@ fn cube_and_boxes() {
     assert_exact(&room, dvec3(0.0, 6.0, 11.0), dvec3(30.0, 6.0, 1.0), 40.0);
     let tower = cuboid(dvec3(1.0, 1.0, 2.0));
     assert_exact(&tower, DVec3::ZERO, dvec3(1.0, 1.0, 2.0), 8f64.sqrt());
-    // Not the opposite corner is the farthest point (Kotani's ant).
+    // The farthest point is not the opposite corner (Kotani's ant).
     assert_exact(
         &tower,
         DVec3::ZERO,

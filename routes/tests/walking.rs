@@ -64,7 +64,7 @@ fn a_gate_is_waited_for() {
     assert_arrives(&plan(&[along_x()], &[gate(3.0, 7.0)])[0], 13.0);
     assert_arrives(&plan(&[along_x()], &[gate(0.0, 2.0)])[0], 10.0);
     assert_arrives(&plan(&[along_x()], &[])[0], 10.0);
-    // Between two gates there is time to pass, or not: it takes 2 from 4 to 6.
+    // There may be enough time between two gates: the walker needs 2 s from 4 to 6.
     assert_arrives(
         &plan(&[along_x()], &[gate(3.0, 7.0), gate(9.1, 12.0)])[0],
         13.0,
@@ -109,7 +109,7 @@ fn who_cannot_pass_is_told() {
     let plans = plan(&[along_x(), back.clone()], &[]);
     assert_arrives(&plans[0], 10.0);
     assert_eq!(plans[1], Err(WalkerError::Blocked));
-    // A mover that blocks no other: it starts after the other has gone by.
+    // This mover does not block the other, because it starts after the other has passed.
     let aside = straight(dvec3(3.0, 0.0, 0.0), dvec3(3.0, 9.0, 0.0));
     let plans = plan(&[aside, along_x()], &[]);
     assert_arrives(&plans[1], 10.0);
@@ -125,7 +125,7 @@ fn a_start_is_waited_for_where_one_stands() {
     assert_arrives(&plans[0], 12.0);
     let times = &plans[0].as_ref().unwrap().times;
     assert_eq!((times[0].0, times[1].0, times[1].1), (0.0, 2.0, 0.0));
-    // Another mover runs it over meanwhile.
+    // While it waits, another mover passes through its position.
     let runs = Mover {
         track: vec![(0.0, dvec3(0.0, -5.0, 0.0)), (2.0, dvec3(0.0, 5.0, 0.0))],
         radius: 0.5,

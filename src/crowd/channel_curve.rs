@@ -89,7 +89,7 @@ fn block_between<L: Lanes>(
     L::store_rotations(tangent, tangents);
 }
 
-/// The middles and tangents of arcs between keys of neighbouring joints.
+/// For neighbouring joints: the middle and the tangent of each joint's arc between its two keys.
 #[inline(always)]
 pub(crate) fn arcs_between<L: Lanes>(
     starts: &[[f32; 4]],

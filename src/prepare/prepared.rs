@@ -463,7 +463,7 @@ impl Segments {
         self.len() * segment_size(self.form)
     }
 
-    /// The bytes of the segments that are computed.
+    /// The computed segments, as bytes.
     #[cfg_attr(not(feature = "vulkan"), allow(dead_code))]
     pub(crate) fn as_bytes(&self) -> &[u8] {
         match self.form {

@@ -265,7 +265,7 @@ pub(crate) enum CopyPosition {
 }
 
 impl TrackCopy {
-    /// The track itself.
+    /// The track itself, neither shifted nor mirrored.
     pub(crate) fn of_track(samples: Range<usize>) -> Self {
         Self {
             samples,

@@ -213,7 +213,8 @@ fn rate_floor(keys: &[f64], quantity: Quantity) -> f64 {
     }
 }
 
-/// Some times within the key interval of a time; outside the keys the time itself.
+/// Three times within the key interval that contains `time`; `time` itself if it is outside the
+/// keys.
 fn within_interval(keys: &[f64], time: f64) -> [f64; 3] {
     let after = keys.partition_point(|&key| key <= time);
     let (Some(before), Some(&end)) = (after.checked_sub(1), keys.get(after)) else {

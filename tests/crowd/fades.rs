@@ -20,7 +20,7 @@ fn set_up(crowd: &mut Crowd, plays: &[CrowdLayer]) {
     for instance in 0..INSTANCES {
         let (ticks, to) = (instance as u64 * 9_973, [1.0, 0.0, 0.37][instance % 3]);
         crowd.fade(instance, 1, to, ticks).unwrap();
-        // One that has begun, or will begin.
+        // This fade has begun already, or will begin.
         let fade = CrowdFade::new(0.25, 1.0)
             .with_start(crowd.clock() + TENTH * (instance as u64 % 7) - 2 * TENTH)
             .with_ticks(3 * TENTH + 1);
@@ -46,7 +46,7 @@ fn a_jump_and_many_steps_fade_alike() {
         began + 4 * TENTH,
         began + 30 * TENTH,
     ];
-    // By jumps, each in another crowd.
+    // Expected: a new crowd for each time, whose clock jumps there.
     let expected = ends.map(|end| {
         let mut crowd = cpu().crowd(&library, INSTANCES, LAYERS).unwrap();
         crowd.set_clock(began).unwrap();
@@ -116,7 +116,7 @@ fn both_ends_of_a_fade_are_exact() {
             bits(&found[9..]),
             "{name}: the upper clip"
         );
-        // Days later it is still so, and a fade back within no time is one at once.
+        // Days later the weight is the same; a fade of 0 ticks takes effect at once.
         crowd.advance_ticks(1 << 45).unwrap();
         assert_eq!(crowd.get(0, 1).unwrap().weight, 1.0);
         crowd.fade(0, 1, 0.25, 0).unwrap();

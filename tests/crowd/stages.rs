@@ -144,7 +144,7 @@ fn assert_stages(
         CrowdStage::ALL.map(|stage| matrices.stage(crowd, stage));
     let library = expected.library().clone();
 
-    // The host changes them before each of two stages.
+    // The host changes the matrices before each of the two stages.
     let mut host = evaluated(expected, CrowdValues::Local);
     record(crowd, &commands, &[&local]);
     assert_bits(&matrices.read(), &host, "local");
@@ -159,7 +159,8 @@ fn assert_stages(
     library.model_to_skinning(&mut host).unwrap();
     assert_bits(&matrices.read(), &host, "skinning");
 
-    // Commands change a few, without a wait. Barriers are for the users that there are.
+    // Commands on the device change a few matrices, without a wait. Barriers are only for the kinds
+    // of commands that are used.
     let mut host = evaluated(expected, CrowdValues::Local);
     let changed = [[0.5, 0.0, -0.25, 1.0]; 3];
     let first = 3 * (random.next() as usize % (rows / 3));
@@ -185,7 +186,7 @@ fn assert_stages(
     library.model_to_skinning(&mut host).unwrap();
     assert_bits(&matrices.read(), &host, "changed by commands");
 
-    // Nothing is changed: the bits of an evaluation without stages.
+    // If nothing is changed, stages give the bits of an evaluation without stages.
     record(crowd, &commands, &[&local, &to_model]);
     let model = evaluated(expected, CrowdValues::Model);
     assert_bits(&matrices.read(), &model, "unchanged, model");
@@ -264,7 +265,8 @@ fn ranges_that_do_not_fit_a_stage_are_refused() {
     let on_cpu = cpu().crowd(&library, 6, 1).unwrap();
     assert_eq!(refused(&on_cpu, matrices.range()), CrowdError::OtherDevice);
 
-    // Room for two instances, of which two are visible, then three; and a target of another crowd.
+    // The range has room for two instances. First two are visible, then three, which is refused; so
+    // is a target of another crowd.
     crowd.set_visible(&[4, 1]).unwrap();
     let range = matrices.buffer.range(256, 2 * each);
     // SAFETY: the buffer is as it must be, and outlives the target.

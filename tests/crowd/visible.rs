@@ -28,7 +28,7 @@ fn visible_instances_have_the_rows_of_the_whole_crowd() {
             let list = some(&mut random, instances, count);
             let mut changes = Vec::new();
             for slot in 0..instances * layers {
-                // All at first, then some here and there, of which few are visible.
+                // First all layers change, then a few, of which few are visible.
                 if count == 3 || random.next().is_multiple_of(9) {
                     let plays = layer(&mut random, &library);
                     changes.push((slot / layers, slot % layers, plays));
@@ -58,7 +58,7 @@ fn visible_instances_have_the_rows_of_the_whole_crowd() {
                 crowd
                     .evaluate_half_into(CrowdValues::Model, &mut half)
                     .unwrap();
-                // The others went on.
+                // The instances that were not visible have continued.
                 if count == 41 {
                     crowd.set_all_visible();
                     let mut half_of_all = vec![[0; 4]; crowd.output_len(CrowdValues::Model)];

@@ -237,7 +237,7 @@ fn rotations_are_smoothed_by_the_book() {
                 for (track, keys) in input.iter().enumerate() {
                     let keys: Vec<DQuat> =
                         keys.iter().map(|key| key.as_dquat().normalize()).collect();
-                    // Where steps of nearly half a turn change their sign, rounding decides.
+                    // For steps of nearly 180°, rounding decides the sign.
                     if track == 4 {
                         continue;
                     }

@@ -20,7 +20,7 @@ fn the_newer_lavapipe_gives_the_same_bits() {
     let Some(manifest) = newer("lvp") else {
         return;
     };
-    // A cache of its own, empty at first: kernels that one test compiled serve the next.
+    // The tests share a cache that is empty at first, so kernels are compiled once.
     let cache = Path::new(env!("CARGO_TARGET_TMPDIR")).join("mesa-lavapipe");
     let _ = std::fs::remove_dir_all(&cache);
     std::fs::create_dir_all(&cache).unwrap();

@@ -70,7 +70,7 @@ fn recorded_passes_give_the_bits_of_those_over_results() {
             let layers = layers(layout);
             let samples = layers[0].sample_count();
             let size = (TRACKS * samples * 16) as u64;
-            // One behind the other, from a place on that kernels can bind.
+            // The inputs are one after another, from an offset on that kernels can bind.
             let inputs =
                 ApplicationBuffer::of(&application, &vec![0; (BESIDE + 3 * size) as usize]);
             let layer = |index: u64| inputs.range(BESIDE + index * size, size);
@@ -198,7 +198,7 @@ fn long_passes_run_at_once() {
     let references = &references()[..LONG_TRACKS];
     for application in Application::all() {
         let engine = application.engine(Mapping::Automatic);
-        // 16 bytes that are not read are before the second.
+        // There are 16 unused bytes before the second.
         let bytes = |result: &Rotations| bytemuck::cast_slice::<_, u8>(result.as_quats()).to_vec();
         let one = ApplicationBuffer::of(&application, &bytes(&first));
         let other = ApplicationBuffer::of(&application, &[vec![7; 16], bytes(&second)].concat());
@@ -370,7 +370,7 @@ fn what_does_not_fit_buffers_is_refused() {
     let refused = target.set_weights(&[f32::NAN]).unwrap_err();
     assert!(matches!(refused, PoseError::WeightOutOfRange { weight } if weight.is_nan()));
 
-    // Nothing is made of nothing; a range cannot be longer than its buffer.
+    // An empty input gives an empty result; a range cannot be longer than its buffer.
     let none = engine.pass(mix(a, b, 0.5), TRACKS, 0, frame_major);
     assert_eq!((none.input_bytes(), none.bytes()), (0, 0));
     // SAFETY: as above.

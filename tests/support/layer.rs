@@ -70,11 +70,11 @@ impl Layer {
             name,
             folder: tempfile::tempdir().unwrap(),
             has_manifest: true,
-            // Checks on the device need buffer addresses, which SwiftShader has not.
+            // Checks on the device need buffer addresses, which SwiftShader does not have.
             driver: on_device.then(lavapipe).flatten(),
             planted,
         };
-        // Its messages about its settings are no faults.
+        // Messages of the layer about its own settings are not faults.
         let filter = "message_id_filter = VALIDATION-SETTINGS,WARNING-Setting-Limit-Adjusted";
         match on_device {
             true => layer.settings(&["validate_core = false", "gpuav_enable = true", filter]),

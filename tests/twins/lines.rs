@@ -583,7 +583,7 @@ fn cards_touch_hardly_more_lines_than_they_need() {
             ("dense", dense(24)),
             ("crowd", crowd(4000)),
             ("scattered", scattered(24)),
-            // As many tracks as fill no whole lines, frame by frame.
+            // The number of tracks does not fill whole lines; results are frame by frame.
             ("odd", sparse(509)),
             // Tracks with the same times.
             ("even", even(96, 48, GENTLE)),
@@ -631,14 +631,14 @@ fn assert_touches_hardly_more_lines(name: &str, launch: &Launch) {
         let (stored, loaded) = (stores.ratio(), loads.ratio());
         ratios += &format!(" {stored:.2} {loaded:.2} |");
         let label = format!("{name}, {wave} lanes, lines of {line}");
-        // Where a run ends within a line, the next one stores the rest of it, in another wave.
+        // If a run ends within a line, the next run stores the rest of the line, in another wave.
         let limit = match (is_spread, line) {
             (true, 128) if name.starts_with("odd") && name.ends_with("FrameMajor") => 1.25,
             (true, 128) => 1.2,
             _ => 1.1,
         };
         assert!(stored <= limit, "{label}: stores {stored}");
-        // Frame by frame neighbours have items of their own, some of which lie across lines.
+        // Frame by frame, neighbouring lanes have separate items, some of which cross a line.
         let limit = if name.ends_with("FrameMajor") {
             1.4
         } else {

@@ -24,7 +24,7 @@ pub(crate) const PATHS: &str = "Paths";
 /// How paths are followed. Options that also exist for rotations are called `--path-…` here, in every command.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct PathArguments {
-    /// The duration, seconds: of paths without times
+    /// The duration in seconds: of paths without times
     #[arg(long, value_name = "S", conflicts_with = "pace", value_parser = positive)]
     seconds: Option<f64>,
     /// The distance that a body covers in a second on paths without times
@@ -39,7 +39,7 @@ pub(crate) struct PathArguments {
     /// Which way a body faces: tangent, ahead:DISTANCE, at:X,Y,Z or at:TRACK
     #[arg(long, value_name = "DIRECTION", default_value = "tangent", value_parser = DirectionArgument::parse)]
     direction: DirectionArgument,
-    /// The orientation about this direction; several are drawn side by side
+    /// How the body is rotated about its direction (its roll); several are drawn side by side
     #[arg(
         id = "path_frame",
         long = "path-frame",

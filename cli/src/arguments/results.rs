@@ -375,7 +375,7 @@ pub(crate) fn check_whole(work: &ClipWork) -> Result<(), Failure> {
     Err(Failure::new(
         ALL_INPUTS,
         format!(
-            "{}: the result would keep the animation that cannot be read; mend or remove it, or write another format",
+            "{}: the result would contain the animation that cannot be read; repair or remove it, or write another format",
             work.name
         ),
     ))

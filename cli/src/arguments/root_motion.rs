@@ -119,8 +119,8 @@ impl RootMotionArguments {
         }
         let joint = clip.set.track_name(root);
         Err(Failure::usage(format!(
-            "{name}: `{joint}` cannot move in a copy of the file, which gets no new channels: it has no rotation keys or \
-             no translation keys, its keys are steps, or it is far from 0; write another format"
+            "{name}: `{joint}` cannot move in a copy of the file, because a copy gets no new channels: the joint has no \
+             rotation keys or no translation keys, or its keys are steps, or it is far from 0; write another format"
         )))
     }
 

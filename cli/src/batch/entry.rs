@@ -414,10 +414,11 @@ pub(crate) fn open(folder: &Path) -> Result<Option<File>, Failure> {
 pub(crate) fn warn_of_damaged_lines(folder: &Path, lines: usize) {
     if lines > 0 {
         let path = folder.join(NAME);
-        let lines = words::count(lines, "line");
+        let belong = if lines == 1 { "belongs" } else { "belong" };
         words::warning(&format!(
-            "{}: {lines} without a result of this directory, left out",
-            path.display()
+            "{}: left out: {} that {belong} to no result in this directory",
+            path.display(),
+            words::count(lines, "line")
         ));
     }
 }

@@ -149,7 +149,9 @@ pub(crate) fn lock(folder: &Folder) -> Result<Option<File>, Failure> {
     match file.try_lock() {
         Err(TryLockError::WouldBlock) => {
             let folder = folder.path().display();
-            let message = format!("{folder}: another tumble is writing into it; wait for it");
+            let message = format!(
+                "{folder}: another process of tumble writes into it; wait until it has ended"
+            );
             Err(Failure::new(OUTPUT, message))
         }
         Ok(()) | Err(TryLockError::Error(_)) => Ok(Some(file)),
@@ -327,7 +329,7 @@ impl Manifest {
             let results = words::count(unknown.len(), "result");
             let stay = if unknown.len() == 1 { "stays" } else { "stay" };
             words::note(&format!(
-                "{results} {stay}, because the input may be somewhere else: {} was not found from this directory",
+                "{results} {stay}: {} was not found from this directory, but it may be somewhere else",
                 first.input
             ));
         }

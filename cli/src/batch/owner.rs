@@ -127,7 +127,7 @@ impl ReplacedOwners {
             return Ok(());
         }
         let remedy = match other.file_name() == path.file_name() {
-            true => "give their directory, whose tree is kept, or --base",
+            true => "name their common directory (its tree is kept), or use --base",
             false => "give --names full, which names results after the whole names of inputs",
         };
         Err(Failure::usage(format!(

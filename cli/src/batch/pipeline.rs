@@ -64,7 +64,7 @@ pub(crate) struct BatchOptions {
     pub(crate) options: ResultOptions,
     /// Results that are done are kept.
     pub(crate) resume: bool,
-    /// Results of other inputs are replaced.
+    /// Existing results are replaced, those of other inputs too.
     pub(crate) overwrite: bool,
     /// Every result and every warning is printed.
     pub(crate) verbose: bool,

@@ -115,7 +115,7 @@ pub(crate) fn name_results(
         if let Some(other) = other.filter(|_| !has_it) {
             let remedy = match others.iter().all(|other| other.below == found.below) {
                 true => {
-                    "give their directory, whose tree is kept, or --base, or evaluate them into different \
+                    "name their common directory (its tree is kept), or use --base, or write the results to different \
                      directories"
                 }
                 false => "give --names full, which names results after the whole names of inputs",

@@ -133,7 +133,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         read => read.map_err(|error| {
             Failure::new(
                 ALL_INPUTS,
-                format!("{shown}: the manifest cannot be read: {error}"),
+                format!(
+                    "{shown}: the manifest cannot be read: {error}; `check` needs a directory of results that `tumble` wrote"
+                ),
             )
         })?,
     };

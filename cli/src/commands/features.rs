@@ -1,4 +1,4 @@
-//! `tumble features`: numbers that people train on.
+//! `tumble features`: features for learning.
 
 use std::ops::RangeInclusive;
 

@@ -57,7 +57,7 @@ fn kinds() -> String {
     mut_arg("path_up", |arg| arg.alias("up")),
     mut_arg("path_speed", |arg| arg.alias("speed")),
     mut_arg("path_frame", |arg| {
-        let arg = arg.value_name("FRAME").help("The orientation about this direction");
+        let arg = arg.value_name("FRAME").help("How the body is rotated about its direction (its roll)");
         arg.action(ArgAction::Set).value_delimiter(None::<char>)
     })
 )]

@@ -187,7 +187,7 @@ struct ClipReport {
     pairs: serde_json::Map<String, serde_json::Value>,
     /// Joints of `--onto` that keep their rest rotations.
     resting: Vec<String>,
-    /// Joints of the input that nothing follows.
+    /// Joints of the input without a partner.
     dropped: Vec<String>,
     /// The dropped joint that rotates furthest from its rest pose, and this angle in degrees.
     furthest_dropped: Option<(String, f64)>,
@@ -275,9 +275,13 @@ impl Arguments {
                 words::warn_of(Diagnostic::new(name, Code::TranslationsDropped, message));
             }
             if let Some((joint, angle)) = &report.furthest_dropped {
+                let (have, their) = match report.dropped.len() {
+                    1 => ("has", "its"),
+                    _ => ("have", "their"),
+                };
                 let message = format!(
-                    "nothing follows {} of the input; of these, `{}` rotates by up to {angle:.1}°, which is lost (--report \
-                     lists them, --bones pairs joints)",
+                    "{} of the input {have} no partner, so {their} rotations are lost; the largest is that of `{}`, \
+                     {angle:.1}° (--report lists such joints, --bones pairs joints)",
                     words::count(report.dropped.len(), "joint"),
                     printable(joint)
                 );

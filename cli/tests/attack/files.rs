@@ -50,7 +50,7 @@ fn somebodys_manifest_is_kept() {
         run(folder, &["eval", "bad.dat", "none.dat", "-o", "out"]);
         assert_eq!(fs::read_to_string(&path).unwrap(), content);
     }
-    // Shards and merging look at it too.
+    // `merge` does not replace it either.
     fs::write(&path, "my notes\n").unwrap();
     succeed(folder, &with(&BATCH, &["--shard", "1/1"]));
     let merged = run(folder, &["merge", "out"]);
@@ -60,7 +60,7 @@ fn somebodys_manifest_is_kept() {
     succeed(folder, &["merge", "out"]);
     succeed(folder, &["check", "out"]);
 
-    // `--overwrite` replaces it.
+    // `--overwrite` replaces the foreign manifest.
     fs::write(&path, "my notes\n").unwrap();
     succeed(folder, &with(&BATCH, &["--overwrite"]));
     succeed(folder, &["check", "out"]);
@@ -160,7 +160,7 @@ fn another_directory_in_the_place_of_that_of_the_results_is_not_written_into() {
         if words[0] == "plot" {
             continue;
         }
-        // Put back, it is continued.
+        // When the directory is put back, `--resume` continues the batch.
         fs::remove_file(&results).unwrap();
         fs::rename(&moved, &results).unwrap();
         fs::remove_file(&late).unwrap();
@@ -292,7 +292,7 @@ fn merging_removes_nothing_elsewhere() {
     let absolute = folder.join("elsewhere/x");
     for hostile in ["../elsewhere/x", absolute.to_str().unwrap()] {
         let text = text.clone() + &line(hostile, "0", 1);
-        // Also where the line about the shard has been made to fit.
+        // Also if the line about the shard was changed to match the text.
         for text in [text.clone(), fitting(&text)] {
             fs::write(&record, text).unwrap();
             let merged = run(folder, &["merge", "out"]);
@@ -300,7 +300,8 @@ fn merging_removes_nothing_elsewhere() {
             assert!(part.exists());
         }
     }
-    // Results are not looked for through links, and lines of an earlier manifest are kept without a look.
+    // Merging does not follow links to results, and keeps the lines of an earlier manifest without checking
+    // them.
     fs::write(&record, fitting(&text)).unwrap();
     let merged = run(folder, &["merge", "out"]);
     assert_eq!(merged.code, 8, "{}", merged.words);

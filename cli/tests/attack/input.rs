@@ -86,7 +86,8 @@ const COMMANDS: [&[&str]; 3] = [
 /// The commands that take any inputs, with their other arguments: by [`COMMANDS`], a format and an output of
 /// all that make a result of each input, else nothing.
 fn taking_inputs() -> Vec<Vec<String>> {
-    // One takes two inputs; another writes one page for all of them; two need other arguments, and skeletons.
+    // `compare` takes two inputs, `view` writes one page for all inputs, and the other two need a skeleton and
+    // more arguments.
     const NOT_HERE: [&str; 4] = ["compare", "view", "retarget", "features"];
     let owned = |line: &[&str]| line.iter().map(|word| (*word).to_owned()).collect();
     let mut all: Vec<Vec<String>> = COMMANDS.iter().map(|line| owned(line)).collect();
@@ -414,7 +415,7 @@ fn mutated(bytes: &[u8], random: &mut Random) -> Vec<u8> {
     let mut bytes = bytes.to_vec();
     let is_text = !bytes.contains(&0);
     for _ in 0..1 + below(3) {
-        // A number of the text, or of the JSON of a GLB.
+        // Changes a number of the text, or of the JSON of a GLB.
         let starts: Vec<usize> = (1..bytes.len())
             .filter(|&i| {
                 bytes[i].is_ascii_digit()
@@ -433,7 +434,7 @@ fn mutated(bytes: &[u8], random: &mut Random) -> Vec<u8> {
                 bytes.splice(start..start + length, number.bytes());
             }
             3 if is_text => {
-                // A line, or an object, twice or not at all.
+                // Repeats or removes a line, or an object of JSON.
                 let mark = if bytes.starts_with(b"{") { b'{' } else { b'\n' };
                 let marks: Vec<usize> = (0..bytes.len()).filter(|&i| bytes[i] == mark).collect();
                 if marks.len() > 1 {
@@ -559,7 +560,7 @@ fn nothing_small_takes_long() {
     );
     text = text.replacen(r#""nodes":[{"name":"a"}],"#, &meshes, 1);
     write("chain.gltf", &text);
-    // Animations, each with a fault.
+    // Each of these animations has a fault.
     let mut text = animations([(0, 0), (0, 7)]);
     let fault =
         r#",{"channels":[{"sampler":9,"target":{"node":0,"path":"rotation"}}],"samplers":[]}"#;

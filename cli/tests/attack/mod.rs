@@ -48,7 +48,7 @@ fn ended(command: &mut Command) -> Run {
         }
         hangs
     });
-    // Its pipes are read meanwhile.
+    // Its pipes are read while it runs, because it would wait if they were full.
     let out = child.stdout.take();
     let words = child.stderr.take();
     let read = |pipe: Option<Box<dyn std::io::Read + Send>>| {

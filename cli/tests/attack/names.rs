@@ -50,7 +50,7 @@ fn no_name_ends_a_batch() {
         first.words
     );
     let made = entries(&folder.join("out"));
-    // Results of a list keep its tree.
+    // Results of the inputs in a list have the directories of the list.
     assert_eq!(made.len(), 9, "{made:?}");
     assert!(made.contains(&format!("walks/{}.npy", "x".repeat(251))));
     let whole = tree(&folder.join("out"));
@@ -123,7 +123,7 @@ fn animations_of_any_name_get_files() {
     }
 }
 
-/// One clip that cannot be written is that clip's failure.
+/// If one clip cannot be written, only this clip fails.
 #[test]
 fn one_clip_that_cannot_be_written_does_not_end_the_others() {
     let temporary = sample_folder();
@@ -204,7 +204,7 @@ fn results_never_share_a_name() {
             .iter()
             .eq(["b.npy", "manifest.jsonl"])
     );
-    // A directory that only shards may use, and results that are inputs.
+    // The input is in a directory `manifest.d`, whose name in a result belongs to shards.
     fs::create_dir_all(folder.join("odd/manifest.d")).unwrap();
     fs::write(folder.join("odd/manifest.d/a.dat"), &keys).unwrap();
     fs::write(folder.join("odd/b.dat"), &keys).unwrap();

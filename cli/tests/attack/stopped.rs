@@ -268,7 +268,8 @@ fn a_full_disk_leaves_what_was_there() {
         succeed(folder, &line);
         let before = tree(&folder.join("out"));
         let largest = before.values().map(Vec::len).max().unwrap();
-        // Half of the largest file is written; some commands finish a smaller one before.
+        // The limit is half of the largest file, so this file cannot be written; some commands
+        // finish a smaller one first.
         let blocks = (largest / 2 / 512).max(1);
         let script = format!(
             "ulimit -f {blocks}; exec '{program}' {} --overwrite 2>words",
@@ -284,7 +285,7 @@ fn a_full_disk_leaves_what_was_there() {
             "{line:?}: {}: {said}",
             run.code
         );
-        // A manifest tells what failed.
+        // Manifests may differ, because they list what failed.
         let results = |mut all: BTreeMap<String, Vec<u8>>| {
             all.retain(|name, _| !name.ends_with("manifest.jsonl"));
             all
@@ -317,7 +318,8 @@ fn a_full_file_system_ends_a_batch_and_resuming_finishes_it() {
     let unmounted = Unmount(folder.join("out"));
     let line = ["eval", "walks", "--fps", "1000", "-o", "out/all"];
     let full = run(folder, &line);
-    // Each input is refused before anything is written, or the disk is full while it is.
+    // Either each input is refused before anything is written, or writing fails when the disk is
+    // full.
     assert!(matches!(full.code, 4 | 7), "{}", full.words);
     assert!(
         full.words.contains("are free") || full.code == 7,

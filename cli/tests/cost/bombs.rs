@@ -206,7 +206,7 @@ fn packed(shape: &str, bytes: usize) -> (Vec<u8>, u32) {
     const PIECE: usize = 1 << 20;
     let text = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': {shape}, }}");
     let header = [b"\x93NUMPY\x01\0\x76\0", format!("{text:117}\n").as_bytes()].concat();
-    // A piece that depends on nothing before it, again and again.
+    // The compressed piece does not refer to data before it, so it can be repeated.
     let mut state = flate2::Compress::new(Compression::best(), false);
     let mut piece = Vec::with_capacity(1 << 16);
     state
@@ -327,7 +327,7 @@ fn every_reader_asks_for_its_memory() {
                     memory,
                     ..Limits::default()
                 };
-                // An array alone says nothing without a map, poses without a rate.
+                // A single array needs a map, and poses without times need a rate.
                 let takes = |option| is_explained && format.takes(option);
                 let options = ReadOptions {
                     limits,

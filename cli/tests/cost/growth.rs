@@ -57,7 +57,7 @@ fn clip(index: usize, tracks: usize, keys: usize, letters: usize) -> Motion {
         let key = |key: usize| Quat::from_rotation_y((key % 7) as f32 * 0.1 + track as f32);
         let keys: Vec<Quat> = (0..keys).map(key).collect();
         clip.set.push(&name, &times, &keys).unwrap();
-        // Half of the joints in one chain, the others beside each other.
+        // Half of the joints form a chain; the others are children of the root.
         let parent = (track > 0).then(|| if track % 2 == 0 { track - 2 } else { 0 });
         clip.skeleton.push(Joint {
             parent,
@@ -276,7 +276,7 @@ fn cases() -> Vec<Case> {
 fn options(format: &Format) -> ReadOptions {
     let rate = FrameRate::new(30, 1).ok();
     ReadOptions {
-        // A file of frames alone has no times.
+        // A format without uneven times may have no times at all.
         source_rate: rate.filter(|_| {
             format.takes(FormatOption::SourceRate) && !format.supports(Feature::UnevenTimes)
         }),

@@ -83,8 +83,8 @@ fn generate(folder: &Path, keys: u32, motion: &[&str]) -> std::path::PathBuf {
     read
 }
 
-/// Bounds are a quarter above what was counted when they were set, without incremental compilation, as in
-/// `scripts/test.sh`: with it fewer functions are inlined.
+/// Bounds are a quarter above the numbers that were counted when they were set. Incremental compilation was
+/// off, as in `scripts/test.sh`, because it inlines fewer functions.
 #[test]
 fn rotations_and_keys_cost_no_more_than_they_did() {
     let folder = tempfile::tempdir().unwrap();

@@ -161,7 +161,7 @@ fn a_large_file_is_read_in_bounded_extra_memory() {
             extra / 1_000_000,
             input.total as f64 / 1e6 / started.elapsed().as_secs_f64()
         );
-        // A block of keys and one of times are in two places at most.
+        // At most two copies of a block of keys and of a block of times exist at once.
         assert!(extra < 128 * MIB, "{boxes} boxes: {} MiB more", extra / MIB);
     }
 }
@@ -256,18 +256,19 @@ fn clips_and_streams_keep_to_the_memory_of_the_engine() {
         let segments = set.key_count() * 112;
         match memory {
             None if kept_segments == Some(0) => {
-                // Keys alone, and what finds the intervals that rotate far.
+                // Only keys are kept, and the data by which intervals with large rotations are
+                // found.
                 assert!(uploading <= of_keys + MIB, "{uploading}");
             }
             None => {
                 assert!(uploading > segments && streaming > 4 * limit);
-                // Segments, keys and spans, and the working memory of the threads.
+                // The memory of segments, keys and spans, and the working memory of the threads.
                 let allowed = set.key_count() * (112 + 16 + 16) + 4 * MIB;
                 assert!(uploading <= allowed, "{uploading}");
             }
             Some(_) => {
                 assert!(uploading <= of_keys + MIB, "{uploading}");
-                // Lists grow by doubling, and three chunks are on their way.
+                // Lists grow by doubling, and three chunks are in work at once.
                 let allowed = 2 * limit + 4 * MIB;
                 assert!(evaluating <= allowed, "{evaluating}");
                 assert!(streaming <= allowed, "{streaming}");
@@ -324,7 +325,8 @@ fn no_request_prepares_all_segments_at_once() {
     for request in requests {
         let peak = peak(&request);
         let explained = request.explain().unwrap();
-        // A piece uses the memory of the one before, and is in two places at most.
+        // A piece uses the memory of the piece before it, and at most two copies of it exist at
+        // once.
         assert!(peak > limit / 4 && peak < 2 * limit, "{explained}: {peak}");
     }
 }

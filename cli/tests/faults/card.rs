@@ -48,11 +48,11 @@ fn a_card_copies_beside_its_kernels_and_is_written_where_the_host_sees_it() {
         assert!(count("copies") > 20, "{card}: {log:?}");
         assert!(count("beside") > 10, "{card}: {log:?}");
         assert_eq!(count("disorder"), 0, "{card}: {log:?}");
-        // Results lie in the device's memory, are copied into the host's that it caches, and both
-        // queues' families may use these buffers.
+        // Results are in the device's memory and are copied to cached memory of the host; both
+        // families of queues may use these buffers.
         assert!(count(DEVICE) > 0 && count(CACHED) > 0, "{card}: {log:?}");
         assert!(count("shared") > 0, "{card}: {log:?}");
-        // Uploads lie in memory that is both, where there is enough of it.
+        // Uploads are in memory that is device-local and host-visible, if there is enough of it.
         assert!(count(BOTH) > 0, "{card}: {log:?}");
         assert_eq!(count(HOST) > 0, card != "rebar", "{card}: {log:?}");
     }
@@ -69,7 +69,7 @@ fn card_work() {
     assert_eq!(card.info().kind, DeviceKind::Discrete);
     let cpu = Engine::new(Device::Cpu).unwrap();
     let set = hostile_set(2, 40);
-    // More segments than a 64th of a small window holds.
+    // This set has more segments than fit into a 64th of a small window.
     let (dense, dense_frames) = dense_set(40, 1000, 0.2);
     let requests = [
         SampleTimes::fps(60).between(0.0, 9.0),
@@ -113,7 +113,8 @@ fn card_work() {
                 }
             }
         }
-        // By large segments, and straight from more keys than samples.
+        // Evaluated from segments of large angles, and directly from keys, of which there are more
+        // than samples.
         let both = [method::SLERP, method::CATMULL_ROM];
         for method in both.into_iter().filter(|_| memory != Some(20_000)) {
             let expected = cpu.evaluate(&dense, method, &dense_frames).unwrap();

@@ -49,7 +49,7 @@ fn a_fault_in_the_library_is_an_error_and_leaks_nothing() {
             faults.push(format!("{call},{result},1,1000000"));
         }
     }
-    // The caller's memory does not come back before what works on it has ended.
+    // The caller gets its memory back only when the device has stopped working in it.
     let last = log.calls["vkWaitForFences"];
     let waits = format!("vkWaitForFences,-1,{last},1 vkDeviceWaitIdle,-2,1,3");
     let (run, log) = loader.run_command(child(), &[("FAULTS", &waits)]);
@@ -60,7 +60,7 @@ fn a_fault_in_the_library_is_an_error_and_leaks_nothing() {
         run.words
     );
     assert_eq!(log.calls["vkDeviceWaitIdle"], 4, "{log:?}");
-    // Not even waiting for everything works, so that nothing may be destroyed.
+    // Even waiting for the whole device fails, so nothing may be destroyed.
     let idle = "vkWaitForFences,-1,1,1000000 vkDeviceWaitIdle,-2,1,1000000";
     let (run, log) = loader.run_command(child(), &[("FAULTS", idle)]);
     assert_eq!(run.code, 0, "{}", run.words);
@@ -77,7 +77,7 @@ fn a_fault_in_the_library_is_an_error_and_leaks_nothing() {
 #[ignore = "part of a_fault_in_the_library_is_an_error_and_leaks_nothing"]
 fn library_work() {
     let work = || -> Result<(), Error> {
-        // With the validation layer where there is one.
+        // With the validation layer, if it is installed.
         let devices = match Device::list_validated() {
             Err(VulkanError::NoValidation) => Device::list()?,
             devices => devices?,
@@ -106,7 +106,8 @@ fn library_work() {
             exported.wait()?;
             exported.memory_file()?;
         }
-        // By segments that are on the device already, by new ones, and straight from keys.
+        // Evaluated from segments that are on the device already, from new ones, and directly from
+        // keys.
         let arcs = engine.upload(&set, method::SLERP)?;
         let found = arcs.evaluate(&frames)?;
         let expected = Engine::new(Device::Cpu)?.evaluate(&set, method::SLERP, &frames)?;

@@ -14,9 +14,9 @@ pub(super) struct Loader {
     folder: tempfile::TempDir,
 }
 
-/// A library that `cargo test` builds among the examples. Where only some tests were asked for it may be
-/// missing or old; building it then compiles the engine once more, for other features than all packages
-/// have together.
+/// A library that `cargo test` builds among the examples. If only some tests were requested, it may be
+/// missing or old. Then it is built here. This compiles the engine again, because one package alone enables
+/// other features than all packages together.
 pub(super) fn example(name: &str) -> PathBuf {
     let folder = Path::new(env!("CARGO_BIN_EXE_tumble")).parent().unwrap();
     let library = folder.join(format!("examples/lib{name}.so"));

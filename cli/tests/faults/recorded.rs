@@ -57,7 +57,7 @@ fn records_at_many_places() {
         let expected = cpu.request(&set, method, &frames).layout(layout);
         let expected = expected.evaluate().unwrap();
         let rotations: &[u8] = bytemuck::cast_slice(expected.as_quats());
-        // One rotation lies between two results.
+        // There is a gap of one rotation between two results.
         let (size, stride) = (rotations.len() as u64, rotations.len() as u64 + 16);
         let buffer = vec![0xff; 100 * stride as usize];
         let buffer = ApplicationBuffer::of(&application, &buffer);

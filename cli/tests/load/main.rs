@@ -182,7 +182,7 @@ fn indices_beyond_32_bits() {
             assert_eq!(chunk.start, next);
             next += chunk.rotations().unwrap().len();
             if chunk.start % (1 << 26) < 1 << 20 || chunk.start > 1 << 32 {
-                // As asked for alone.
+                // A request for this sample alone gives the same bits.
                 let (track, sample) = (chunk.tracks.start, chunk.samples.start);
                 let time = sample as f64 / f64::from(rate);
                 let selected = set.select(track..track + 1)?;
@@ -201,7 +201,7 @@ fn indices_beyond_32_bits() {
         started.elapsed().as_secs_f64()
     );
 
-    // By whole frames, a device with windows of its own, near the end.
+    // Frame by frame, near the end of the result; a device divides it into other windows.
     let wide = swinging(2048, 3, 1.0);
     let mut hashes = Vec::new();
     for engine in engines(&EngineOptions::default()) {
@@ -359,7 +359,7 @@ fn a_motion_capture_library() {
     fs::create_dir(folder.join("in")).unwrap();
     let (mut tracks, mut keys) = (0, 0);
     for clip in 0..2500 {
-        // 44 or 45 boxes, 86 to 586 keys.
+        // A clip has 44 or 45 boxes, and each box 86 to 586 keys.
         let boxes = 44 + usize::from(clip % 5 < 3);
         let keys_per_track = 86 + (clip * 37) % 501;
         tracks += boxes;

@@ -35,7 +35,7 @@ fn an_hour_of_the_same_work_leaves_nothing_behind() {
     let mut after_a_minute = None;
     let (mut rounds, mut peak, mut last_report) = (0u64, (0.0f64, 0), Instant::now());
     while started.elapsed() < Duration::from_secs(seconds) {
-        // Kept engines, and one opened anew.
+        // Engines that are kept, and one that is opened again in each round.
         let mut all = engines(&EngineOptions::default());
         all.extend(
             vulkan_devices()

@@ -150,8 +150,8 @@ fn motive(rows: &[Row]) -> Result<CaptureHeading, String> {
     let names: Vec<String> = (0..axes.len().max(kinds.len())).map(name).collect();
     if !names.iter().any(|name| name.ends_with(".w")) {
         return Err(
-            "this table of Motive has no rotations, such as one of markers alone: export the take again with rigid \
-             bodies or bones"
+            "this table of Motive has no rotations, perhaps only markers: export the take again with rigid bodies or \
+             bones"
                 .to_owned(),
         );
     }

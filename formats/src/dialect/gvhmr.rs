@@ -10,8 +10,8 @@ use crate::npz::archive::Archive;
 /// The dict with the parameters in the world, and how the names of its values begin.
 const WORLD: &str = "smpl_params_global.";
 
-/// Leaves the values of the body in the world, by their names in the model; `None` for other files. Returns the options
-/// with the rate, and a warning that it is assumed.
+/// Keeps only the parameters of the body in world space, and gives them the names of the body model; `None` for other
+/// files. Returns the options with the rate, and a warning that it is assumed.
 pub(crate) fn narrowed(
     archive: &mut Archive,
     options: &ReadOptions,

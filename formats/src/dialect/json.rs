@@ -385,8 +385,10 @@ fn episode(
                 let list = values(frame).unwrap_or_default();
                 let found: Vec<f64> = list.iter().filter_map(Value::as_f64).collect();
                 if found.len() != count || list.len() != count {
-                    let message =
-                        format!("{} numbers, and {count} in the first frame", found.len());
+                    let message = format!(
+                        "this frame has {} numbers, and the first frame has {count}",
+                        found.len()
+                    );
                     let refusal = Diagnostic::new(file, Code::Shape, message);
                     return Err(refusal.inside(format!("data[{index}]{pointer}")));
                 }

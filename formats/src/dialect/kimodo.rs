@@ -63,7 +63,8 @@ pub(super) static DIALECT: Dialect = Dialect {
             None => {
                 warnings.warn(Code::UnnamedJoints, || {
                     let message = format!(
-                        "the file does not name its joints ({count}); they are called joint_0, joint_1 …, and are in the world"
+                        "the file does not name its joints ({count}); they are called joint_0, joint_1 …, and their poses are in \
+                         world space"
                     );
                     (None, message)
                 });

@@ -156,8 +156,8 @@ impl WrittenDialect {
             .filter(|&assumed| rate.per_second() != assumed as f64);
         let warning = assumed.map(|assumed| {
             let message = format!(
-                "{} stores no rate, and programs that read it assume {assumed} frames a second; these have {rate}: \
-                 set the rate there, or use `tumble eval --fps {assumed}`",
+                "{} stores no rate, and programs that read it assume {assumed} frames a second; this motion has {rate}: \
+                 set the rate in that program, or use `tumble eval --fps {assumed}`",
                 self.name
             );
             Diagnostic::new(motion.output, Code::AssumedRate, message)

@@ -335,7 +335,7 @@ impl GltfDocument {
         is_text: bool,
     ) -> Result<(), Diagnostic> {
         if is_text && self.container.is_glb() {
-            let message = "a GLB is written as a GLB; name the output .glb";
+            let message = "a GLB cannot be written as .gltf; end the name of the output in .glb";
             return Err(Diagnostic::new(&self.name, Code::GltfFolder, message));
         }
         let is_gathered = !is_text && !self.container.is_glb();

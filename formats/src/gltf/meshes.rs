@@ -162,7 +162,7 @@ pub(super) fn add(
         .get("KHR_draco_mesh_compression")
         .is_some()
     {
-        let message = "the mesh is compressed by Draco, which is not known; export it without";
+        let message = "the mesh is compressed by Draco, which is not supported; export it without compression";
         return Err(json.refuse(pointer, Code::Extension, message));
     }
     let Some(position) = primitive.attributes.position else {

@@ -297,7 +297,7 @@ mod tests {
         assert_eq!(refused, KimodoError::TooFewFrames { frames: 4 });
     }
 
-    /// The factored matrix is that of accelerations.
+    /// Solving gives back the points whose second differences are the right side.
     #[test]
     fn the_system_is_solved() {
         for frames in [3, 4, 5, 17] {

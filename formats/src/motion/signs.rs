@@ -20,7 +20,7 @@ pub(crate) struct Signs {
 }
 
 impl Signs {
-    /// For this number of tracks and samples.
+    /// The state for `tracks` tracks with `samples` samples each.
     pub(crate) fn new(layout: Layout, tracks: usize, samples: usize) -> Self {
         let tracks = match layout {
             Layout::TrackMajor => 1,

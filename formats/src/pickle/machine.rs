@@ -470,8 +470,7 @@ impl<'a> Machine<'a> {
             )),
             0x97 | 0x98 => Err(self.refuse(
                 Code::PickleForm,
-                "the data of an array lies outside the pickle (buffer_callback); save it again \
-                 without"
+                "the data of an array is outside the pickle (buffer_callback); save it again without buffer_callback"
                     .to_owned(),
             )),
             b'i' | b'o' | 0x82..=0x84 => {
@@ -700,7 +699,7 @@ impl<'a> Machine<'a> {
         let expanded = usize::try_from(count).unwrap_or(usize::MAX);
         if let Err(error) = self.budget.borrow(expanded, size_of::<NodeId>()) {
             return refuse(format!(
-                "with every reference it has {count} values: {error}"
+                "if each reference counts, it has {count} values: {error}"
             ));
         }
         Ok(())

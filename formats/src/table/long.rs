@@ -117,7 +117,7 @@ impl<S: RowSink> ResultWriter for Rotations<'_, S> {
         let missing = self.all() - self.written;
         if missing > 0 {
             return Err(invalid(format!(
-                "{missing} rotations of the shape are missing"
+                "{missing} rotations of the result were not written"
             )));
         }
         self.batch.flush(&mut self.sink)?;

@@ -58,7 +58,8 @@ fn a_clip_comes_back_as_nodes_a_skin_and_an_animation() {
         assert_eq!(list("scale", &[1.0; 3]), rest.scale.to_array());
     }
 
-    // Each joint's matrix undoes its pose in the world, as multiplied out here from the root.
+    // The matrix of each joint is the inverse of its pose in the world, which is computed here from
+    // the root on.
     let skin = &json["skins"][0];
     assert_eq!(json["skins"].as_array().unwrap().len(), 1);
     assert_eq!(
@@ -182,7 +183,7 @@ fn clips_share_nodes_where_their_skeletons_are_equal() {
     };
     assert_eq!(moved(2), moved(0));
     assert_eq!(moved(3)[0], (6, "rotation"));
-    // The third camera stands beside its node, which rests at the origin.
+    // The third camera is translated relative to its node, which rests at the origin.
     let [r, t] = ["rotation", "translation"];
     assert_eq!(moved(1), [(3, r), (3, t), (4, r), (5, r), (5, t)]);
 }

@@ -50,7 +50,7 @@ fn pose(stamp: u64, x: f64) -> Vec<u8> {
 
 #[test]
 fn a_stamp_of_zero_is_a_time_where_others_have_stamps() {
-    // A simulation that begins at 0; the log's clock is another.
+    // The stamps are those of a simulation that begins at 0, not of the log's clock.
     let mut log = LogBuilder::new();
     let topic = log.topic("/sim", POSE, "cdr");
     for k in 0..4u32 {
@@ -66,7 +66,8 @@ fn a_stamp_of_zero_is_a_time_where_others_have_stamps() {
         (clip.time_offset, clip.rate),
         (0, FrameRate::new(10, 1).ok())
     );
-    // Stamps of the log's clock, one of which is missing; and no stamps at all.
+    // One topic has stamps of the log's clock, one of which is missing; the other topic has no
+    // stamps.
     let mut log = LogBuilder::new();
     let (some, none) = (
         log.topic("/some", POSE, "cdr"),
@@ -120,7 +121,7 @@ fn static_transforms_have_no_time() {
         assert_eq!(clip.rate, FrameRate::new(10, 1).ok());
         assert_eq!(clip.channels, []);
     }
-    // Alone they stand at the time when they came.
+    // Without other topics, static transforms have the time at which they were logged.
     let mut log = LogBuilder::new();
     let fixed = log.topic("/tf_static", TF, "cdr");
     log.message(fixed, NOW, &transform(0, ["a", "b"], 2.0));
@@ -360,7 +361,7 @@ fn a_route_of_a_planner_has_no_times() {
         let fault = try_read(&bytes).unwrap_err();
         assert_eq!(fault.code, Code::McapRoute);
         assert!(fault.message.contains("6 poses has no times"), "{fault}");
-        // It is a path to follow.
+        // The message can be read as a path for `follow`.
         let route = read_paths("t", "route", &bytes, Some(Pace::Seconds(10.0))).unwrap();
         let route = route.set.vector_keys(Channel::Translation, 0).unwrap();
         assert_eq!(route.times, [0.0, 2.0, 4.0, 6.0, 8.0, 10.0]);

@@ -68,7 +68,8 @@ fn smpl_h_is_read_with_names_parents_rate_and_root() {
     assert_eq!(rotations.len(), 4 * joints.len() * frames.len());
     let mut expected_keys = rotations.chunks_exact(4);
     let mut worst: f64 = 0.0;
-    // The list is by frame or by joint: the first frame's second joint decides, and each is checked.
+    // The expected list is by frame or by joint, which the second joint of the first frame shows. Every
+    // entry is checked.
     let by_frame = apart(clip.set.track(joints[1]).keys[frames[0]], &rotations[4..8]) < 1e-3;
     for outer in 0..4 {
         for inner in 0..4 {
@@ -82,7 +83,8 @@ fn smpl_h_is_read_with_names_parents_rate_and_root() {
         }
     }
     assert!(worst < 1e-7, "{worst:e}");
-    // Frame 60 of joint 1 is 3.2 rad long, frame 61 lies on the other side of π: no sign turns.
+    // The rotation vector of joint 1 is longer than π at frame 60 and shorter at frame 61; the
+    // keys' signs do not jump.
     for track in clip.set.tracks() {
         assert!(
             track
@@ -132,7 +134,7 @@ fn bodies_are_in_the_world() {
         .map(|track| track.name.unwrap())
         .collect();
     assert_eq!(names, ["pelvis", "torso", "head", "hand"]);
-    // The samples are the first joints of the other file.
+    // The samples are equal to the first joints of the other file.
     for track in 0..4 {
         for (key, other) in bodies
             .set

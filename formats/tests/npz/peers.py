@@ -21,7 +21,8 @@ for name in ["smplh_like.npz", "smplx_like.npz"]:
     assert np.array_equal(own["times"], np.arange(frames) / 120)
     assert own["fps"] == 120 and own["parents"][0] == -1 and own["names"][1] == "left_hip"
 
-    # The layout as it was: signs and lengths of vectors may differ, rotations not.
+    # The file keeps its layout. Signs and lengths of rotation vectors may differ, the rotations are
+    # the same.
     assert kept["poses"].dtype == given["poses"].dtype
     again = Rotation.from_rotvec(kept["poses"].reshape(-1, 3))
     apart = max(apart, (again.inv() * expected).magnitude().max())

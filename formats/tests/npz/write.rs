@@ -78,7 +78,7 @@ fn our_layout_reads_back_as_written() {
         (&found.name, found.rate, found.is_world),
         (&clip.name, None, false)
     );
-    // Written once more from the clip as read: the same file, but for the notes.
+    // Writing the clip that was read gives the same file, except for the notes.
     let again = SampledClip {
         clip: found,
         ..sampled.clone()
@@ -225,7 +225,7 @@ fn poses_and_their_pieces_stay_the_same() {
     let loaded = read(std::fs::read(path).unwrap()).unwrap();
     let (bytes, _, warnings) = halved(&loaded, &[]);
     assert!(warnings.is_empty(), "{warnings:?}");
-    // With `poses` out of the way the pieces are read.
+    // Without `poses`, the arrays of its parts are read.
     let mut pieces = bytes.clone();
     for at in 0..pieces.len() - 9 {
         if &pieces[at..at + 9] == b"poses.npy" {

@@ -289,8 +289,8 @@ class MotionLibrary(Generic[_A]):
     """Clips of one skeleton, of any lengths and rates, which can be sampled at any times.
 
     `clips`: a list of `Clip`s with the same joints, in any order: they are matched by name, by index only if no clip
-    has names, and another name, number or parent is refused. `method`: by which they are interpolated, as that of
-    `Engine.evaluate`. `skeleton`: a `Clip`, a file with one, or the parents and offsets of the tracks of the first
+    has names, and another name, number or parent is refused. `method`: the interpolation method, with the same names
+    as in `Engine.evaluate`. `skeleton`: a `Clip`, a file with one, or the parents and offsets of the tracks of the first
     clip; its offsets are then those of all clips. Without it the skeleton is that of the first clip, and each clip
     keeps its own offsets. Arrays have the joints in the order of the skeleton (`joint_names`). `names`: the names of
     the clips; by default the names that they have, or those of their files. `engine`: its threads are used; by default
@@ -317,8 +317,8 @@ class MotionLibrary(Generic[_A]):
 
     `paths`: the path of the file of each clip; empty for a clip that was not read from one.
 
-    Times count from the first key of a clip, and are kept to at least 0.5 µs (30 ns for clips of up to two minutes);
-    before 0 and after its end, a clip keeps its first and last pose.
+    Times count from the first key of a clip, and are stored with an error of at most 0.5 µs (30 ns for clips of up to two
+    minutes); before 0 and after its end, a clip keeps its first and last pose.
 
     >>> import numpy as np, tumble
     >>> half = 0.5 ** 0.5
@@ -1344,9 +1344,9 @@ class MotionLibrary(Generic[_A]):
 
     @property
     def nbytes(self) -> int:
-        """The bytes of the prepared clips: with slerp 16 per key of a joint (8 if `packed`), with smooth methods 192; and for
-        the root 16 to 48 per key of its position and time. A library on a device has as many there, and keeps
-        those of the host for `save` and for copies.
+        """The bytes of the prepared clips: with slerp 16 per key of a joint (8 if `packed`), with smooth methods 192; and
+        for each frame of a clip 16 for its time and 16 for the position of the root (more if that is a cubic). A library on
+        a device has as many there, and keeps those of the host for `save` and for copies.
 
         >>> import numpy as np, tumble
         >>> keys = np.tile([0.0, 0.0, 0.0, 1.0], (22, 3000, 1))

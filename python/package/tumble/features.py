@@ -1,5 +1,5 @@
-"""Numbers that people train on, of arrays: rotations as six numbers, headings, root motion, contacts, mirrored poses, and the 263
-numbers of HumanML3D. All are computed in float64, with the same bits on every processor.
+"""Features for learning, computed from arrays: rotations as six numbers, headings, root motion, contacts, mirrored poses,
+and the 263 numbers of HumanML3D. All are computed in float64, with the same bits on every processor.
 
 >>> import tumble
 >>> tumble.features.mirror_pairs(["left_foot", "right_foot"])

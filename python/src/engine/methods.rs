@@ -149,11 +149,11 @@ impl Engine {
     /// `device_array`: the result stays on the NVIDIA card that makes it, as a `DeviceArray` that torch, CuPy and JAX
     /// take without a copy. Raises `DeviceError` if this is not possible.
     ///
-    /// Other options: `method` ("authored": the method that the file gives each channel, bessel-overhauser
-    /// where it gives none; see `tumble.methods()`), `signs` ("shortest", "as-authored"), `ends`
-    /// ("parabolic", "natural", "clamped", "secant", "loop", "frozen", or angular velocities (2, 3),
-    /// rad/s), `speed` ("as-keyed", "constant"), `before` and `after` ("hold", "loop", "mirror",
-    /// "extrapolate", "leave-out": no samples there), `tension`, `continuity`, `bias`.
+    /// Other options: `method` ("authored": the interpolation that the file states for each channel, slerp
+    /// for BVH, bessel-overhauser for others that state none; see `tumble.methods()`), `signs` ("shortest",
+    /// "as-authored"), `ends` ("parabolic", "natural", "clamped", "secant", "loop", "frozen", or angular
+    /// velocities (2, 3), rad/s), `speed` ("as-keyed", "constant"), `before` and `after` ("hold", "loop",
+    /// "mirror", "extrapolate", "leave-out": no samples there), `tension`, `continuity`, `bias`.
     ///
     /// >>> import numpy as np, tumble
     /// >>> clip = tumble.Clip([0.0, 1.0], [[0, 0, 0, 1], [0, 0, 1, 0]])

@@ -33,7 +33,7 @@ pub struct Mesh {
     /// Largest extent along an axis.
     pub(crate) size: f64,
     pub(crate) has_branches: bool,
-    /// The piece of each vertex.
+    /// The connected part of the mesh (piece) to which each vertex belongs.
     pub(crate) pieces: Vec<u32>,
     /// The number of triangles of each piece.
     pub(crate) piece_sizes: Vec<usize>,

@@ -8,7 +8,7 @@ use crate::triangle::{blend, nearest_weights};
 /// Number of triangles in a leaf.
 const LEAF: usize = 4;
 
-/// A tree of boxes around halves of the triangles.
+/// A tree of bounding boxes; each node has half of the triangles of its parent.
 #[derive(Debug, Clone)]
 pub(crate) struct FaceTree {
     /// A complete binary tree: the halves of box `i` are `2i + 1` and `2i + 2`.

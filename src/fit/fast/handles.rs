@@ -40,7 +40,8 @@ const LONGEST_CHORD: f32 = 1.0;
 /// The largest squared extent of a curve whose f32 numbers are valid.
 pub(crate) const LONGEST_DIRECT: f64 = MEDIUM_WAVES.limit;
 
-/// Added to the squared extent of a curve whose numbers may not be valid.
+/// Added to the squared extent of a curve whose numbers may not be valid, so that it exceeds every
+/// bound of the fast fits.
 const IN_DOUBT: f64 = 2.0;
 const _: () = assert!(IN_DOUBT > LONGEST_DIRECT);
 

@@ -85,7 +85,7 @@ struct Size {
     joints: u32,
     /// The most spans of a time base.
     spans: u32,
-    /// Cells of segments and keys, before the masks.
+    /// The number of cells with segments and keys; the masks follow them.
     cells: u32,
 }
 

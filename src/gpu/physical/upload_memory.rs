@@ -25,7 +25,7 @@ const SMALL: u64 = 64;
 /// Device-local memory that the host can write.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct DirectMemory {
-    /// The memory type.
+    /// The index of the memory type in the device's list.
     pub(crate) memory_type: u32,
     /// The maximum size in bytes of an upload that uses it by default.
     pub(crate) largest: u64,

@@ -300,7 +300,8 @@ impl KeyDispatch<'_, '_> {
         if written.imported.is_none() {
             let written_keys = take_first(&mut written.keys, keys.len());
             if track.signs.any() {
-                // Whole keys are written in order, because this memory may be slow to read.
+                // Each key is written whole and in order, and never read: this memory may be
+                // write-combined (docs/gpu-memory.md).
                 for (i, (to, &[x, y, z, w])) in written_keys.iter_mut().zip(keys).enumerate() {
                     let sign = SIGN_NEGATED * u32::from(track.signs.is_negated(i));
                     *to = [x | sign, y, z, w];

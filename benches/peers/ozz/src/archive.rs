@@ -96,7 +96,7 @@ impl Entries {
         let count = (duration as usize).max(1);
         let (mut bytes, mut starts) = (Vec::new(), Vec::new());
         for part in 1..=count {
-            // The key at the end of the interval at this time.
+            // The key that ends the interval at this time.
             let newest = ((keys - 1) * part / count + 1).min(keys - 1);
             starts.push(bytes.len() as u32);
             starts.push((tracks * (newest + 1) - 1) as u32);

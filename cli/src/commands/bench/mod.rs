@@ -39,7 +39,7 @@ pub(crate) struct Arguments {
     /// What to measure
     #[arg(value_enum, default_values = ["sparse", "small"])]
     workloads: Vec<WorkloadKind>,
-    /// How often each is measured, after a warm-up; the median is reported
+    /// How often each workload is measured, after a warm-up; the median is reported
     #[arg(long, default_value_t = 7, value_parser = words::whole_number::<u32>(1, 1000))]
     rounds: u32,
     /// Make every workload smaller by this factor, to try it out

@@ -85,14 +85,14 @@ pub(crate) struct Arguments {
     /// Compare joints in the world instead of relative to their parents
     #[arg(long)]
     world: bool,
-    /// The largest angle: 0.1deg or 0.002rad, degrees without a unit; for arrays
+    /// The largest allowed angle: 0.1deg or 0.002rad, degrees without a unit; for arrays
     /// other than rotations, the largest difference of two numbers
     #[arg(long, value_name = "ANGLE", value_parser = degrees, allow_hyphen_values = true)]
     tolerance: Option<f64>,
-    /// The largest distance: between corresponding translations
+    /// The largest allowed distance: between corresponding translations
     #[arg(long, value_name = "LENGTH", value_parser = not_negative, allow_hyphen_values = true)]
     distance: Option<f64>,
-    /// Align the second trajectory to the first by least squares, by these transformations
+    /// Which transformations align the second trajectory to the first, by least squares
     #[arg(long, value_name = "FREEDOM", value_parser = alignment(), help_heading = TRAJECTORIES)]
     align: Option<Align>,
     /// Absolute errors: pose by pose

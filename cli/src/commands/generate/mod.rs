@@ -32,7 +32,7 @@ pub(crate) struct Arguments {
     /// Keys of each box
     #[arg(long, default_value = "26", value_parser = words::whole_number::<u32>(1, u64::from(u32::MAX)))]
     keys: u32,
-    /// The duration, seconds: the time of the last key; the first is at 0
+    /// The duration in seconds: the time of the last key; the first is at 0
     #[arg(long, default_value = "20", value_parser = positive, allow_hyphen_values = true)]
     seconds: f64,
     /// Keys at even times (default)

@@ -137,7 +137,7 @@ fn bits(proof: &Proof, text: &mut String) {
     for replaced in &kernels.replaced {
         let _ = writeln!(
             text,
-            "                    {} differs in {} of {} values: others are used in its place",
+            "                    {} differs in {} of {} values: other kernels are used instead",
             replaced.name, replaced.differing, replaced.values
         );
     }
@@ -257,7 +257,7 @@ fn speed(proof: &Proof, text: &mut String) {
     );
     let _ = writeln!(
         text,
-        "  bus: up {}, down {}; an empty submission until its fence {}",
+        "  bus: up {}, down {}; from an empty submission to its fence {}",
         rate(figures.upload_rate),
         rate(figures.download_rate),
         time(figures.submit_and_fence)

@@ -54,10 +54,10 @@ pub(crate) struct Arguments {
     inputs: Inputs,
     #[command(flatten)]
     results: ResultArguments,
-    /// The largest angle: 0.1deg or 0.002rad, degrees without a unit
+    /// The largest allowed angle: 0.1deg or 0.002rad, degrees without a unit
     #[arg(long, value_name = "ANGLE", default_value = "0.1deg", value_parser = degrees, allow_hyphen_values = true)]
     tolerance: f64,
-    /// The largest distance: in the input's unit of length [default: the arc of the angle at the end of the longest chain of joints]
+    /// The largest allowed distance: in the input's unit of length [default: the arc of the angle at the end of the longest chain of joints]
     #[arg(long, value_name = "LENGTH", value_parser = not_negative, allow_hyphen_values = true)]
     distance: Option<f64>,
     /// Points at this distance from each joint, along its axes, stay within --distance too, as a
@@ -80,7 +80,7 @@ pub(crate) struct Arguments {
     /// The sequence of axes: of the angles of BVH, three different ones [default: those of the input, else ZXY]
     #[arg(long, value_name = "AXES", value_parser = sequence)]
     sequence: Option<EulerSequence>,
-    /// Also draw, as .svg or .png: the errors of the joints over time; needs a single input
+    /// Also draw a picture, as .svg or .png: the errors of the joints over time; needs a single input
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
 }

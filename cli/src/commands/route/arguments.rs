@@ -73,7 +73,7 @@ pub(crate) struct Arguments {
     /// Where to write: a CSV (`-`: standard output), or a directory for pairs and walkers
     #[arg(short, long = "output", alias = "out", value_name = "OUT")]
     pub(crate) out: PathBuf,
-    /// Also draw, as .svg or .png: the mesh from above with the routes
+    /// Also draw a picture, as .svg or .png: the mesh from above with the routes
     #[arg(long, value_name = "FILE")]
     pub(crate) plot: Option<PathBuf>,
     /// Replace existing files

@@ -77,7 +77,7 @@ pub(crate) struct Arguments {
     /// The sequence of axes: of the angles of BVH, three different ones [default: those of the input, else ZXY]
     #[arg(long, value_name = "AXES", value_parser = sequence)]
     sequence: Option<EulerSequence>,
-    /// Also draw, as .svg or .png: the speeds of the noisiest joint before and after; needs a single input
+    /// Also draw a picture, as .svg or .png: the speeds of the noisiest joint before and after; needs a single input
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
     #[command(flatten)]

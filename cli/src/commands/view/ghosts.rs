@@ -174,7 +174,7 @@ fn reason(error: &CompareError) -> String {
             near: Some([first, second]),
             ..
         } => format!(
-            "no joint has the same name in both (`{first}` and `{second}` are near, but only equal names match)"
+            "no joint has the same name in both (`{first}` and `{second}` are similar, but only equal names match)"
         ),
         CompareError::NoTrackInBoth { .. } => "no joint has the same name in both".to_owned(),
         error => error.to_string(),

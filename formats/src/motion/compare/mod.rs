@@ -23,7 +23,7 @@ pub use crate::motion::compare::tally::Spread;
 
 fn hint(near: Option<&[String; 2]>) -> String {
     near.map_or_else(String::new, |[first, second]| {
-        format!(" (`{first}` and `{second}` are near, but only equal names match)")
+        format!(" (`{first}` and `{second}` are similar, but only equal names match)")
     })
 }
 

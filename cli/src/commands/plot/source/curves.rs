@@ -171,7 +171,8 @@ impl PlotSource<'_> {
         }
     }
 
-    /// Components of one box: one colour each where they share a panel, else the methods'.
+    /// The components of one box. In a shared panel each component has a colour; otherwise each
+    /// method has one.
     fn components(
         &self,
         device: &mut OpenedDevice,
@@ -417,7 +418,7 @@ impl PlotSource<'_> {
     }
 }
 
-/// The name of its track, such as a joint's; `box 1` where it has none.
+/// The name of the track at `index`, such as a joint's; `box 1` if it has none.
 pub(crate) fn box_name(set: &TrackSet, index: usize) -> String {
     match set.track(index).name.filter(|name| !name.is_empty()) {
         Some(name) => printable(name).into_owned(),
