@@ -25,6 +25,7 @@ pub(crate) enum Global {
     FirstEntry,
     FoundParameters,
     FoundSpans,
+    Frames,
     FromLayer,
     Gathered,
     Halves,
@@ -38,6 +39,7 @@ pub(crate) enum Global {
     Local,
     Matrices,
     Mixed,
+    Picks,
     Positions,
     Probes,
     Rates,
@@ -54,6 +56,7 @@ pub(crate) enum Global {
     Tile,
     TimeBases,
     ToLayer,
+    Tracks,
     Values,
     Visible,
     Weights,
@@ -80,6 +83,7 @@ impl Global {
         Self::FirstEntry,
         Self::FoundParameters,
         Self::FoundSpans,
+        Self::Frames,
         Self::FromLayer,
         Self::Gathered,
         Self::Halves,
@@ -93,6 +97,7 @@ impl Global {
         Self::Local,
         Self::Matrices,
         Self::Mixed,
+        Self::Picks,
         Self::Positions,
         Self::Probes,
         Self::Rates,
@@ -109,6 +114,7 @@ impl Global {
         Self::Tile,
         Self::TimeBases,
         Self::ToLayer,
+        Self::Tracks,
         Self::Values,
         Self::Visible,
         Self::Weights,
@@ -116,13 +122,13 @@ impl Global {
     ];
 }
 
-pub(crate) const GLOBALS: usize = 50;
+pub(crate) const GLOBALS: usize = 53;
 
 /// Variables of which each invocation has its own.
 pub(crate) const PRIVATE: [Global; 1] = [Global::FirstEntry];
 
 /// The variables that kernels bind, in the order of the bindings.
-const BOUND: [&[Global]; 29] = [
+const BOUND: [&[Global]; 31] = [
     &[Global::Probes, Global::Replies],
     &[
         Global::Segments,
@@ -248,6 +254,8 @@ const BOUND: [&[Global]; 29] = [
     &[Global::Links, Global::States],
     &[Global::Rates, Global::States],
     &[Global::States, Global::Values],
+    &[Global::Frames, Global::Tracks, Global::States],
+    &[Global::Picks, Global::States, Global::Values],
     &[Global::Keys, Global::Intervals, Global::Rotations],
 ];
 
@@ -266,35 +274,35 @@ const fn entry(
 }
 
 /// The entry points: those of the kernels in their order, and then those that read texel buffers.
-pub(crate) static ENTRIES: [Entry; 220] = [
+pub(crate) static ENTRIES: [Entry; 228] = [
     entry(0, None, 64, None),
-    entry(1, Some(Global::Dispatch), 64, Some(159)),
-    entry(1, Some(Global::Dispatch), 64, Some(160)),
-    entry(1, Some(Global::Dispatch), 64, Some(161)),
-    entry(1, Some(Global::Dispatch), 64, Some(162)),
-    entry(1, Some(Global::Dispatch), 64, Some(163)),
-    entry(1, Some(Global::Dispatch), 64, Some(164)),
     entry(1, Some(Global::Dispatch), 64, Some(165)),
     entry(1, Some(Global::Dispatch), 64, Some(166)),
     entry(1, Some(Global::Dispatch), 64, Some(167)),
-    entry(2, Some(Global::Dispatch), 64, Some(168)),
-    entry(2, Some(Global::Dispatch), 64, Some(169)),
-    entry(2, Some(Global::Dispatch), 64, Some(170)),
-    entry(2, Some(Global::Dispatch), 64, Some(171)),
-    entry(2, Some(Global::Dispatch), 64, Some(172)),
-    entry(2, Some(Global::Dispatch), 64, Some(173)),
+    entry(1, Some(Global::Dispatch), 64, Some(168)),
+    entry(1, Some(Global::Dispatch), 64, Some(169)),
+    entry(1, Some(Global::Dispatch), 64, Some(170)),
+    entry(1, Some(Global::Dispatch), 64, Some(171)),
+    entry(1, Some(Global::Dispatch), 64, Some(172)),
+    entry(1, Some(Global::Dispatch), 64, Some(173)),
     entry(2, Some(Global::Dispatch), 64, Some(174)),
     entry(2, Some(Global::Dispatch), 64, Some(175)),
     entry(2, Some(Global::Dispatch), 64, Some(176)),
-    entry(3, Some(Global::Dispatch), 64, Some(177)),
-    entry(3, Some(Global::Dispatch), 64, Some(178)),
-    entry(3, Some(Global::Dispatch), 64, Some(179)),
-    entry(3, Some(Global::Dispatch), 64, Some(180)),
-    entry(3, Some(Global::Dispatch), 64, Some(181)),
-    entry(3, Some(Global::Dispatch), 64, Some(182)),
+    entry(2, Some(Global::Dispatch), 64, Some(177)),
+    entry(2, Some(Global::Dispatch), 64, Some(178)),
+    entry(2, Some(Global::Dispatch), 64, Some(179)),
+    entry(2, Some(Global::Dispatch), 64, Some(180)),
+    entry(2, Some(Global::Dispatch), 64, Some(181)),
+    entry(2, Some(Global::Dispatch), 64, Some(182)),
     entry(3, Some(Global::Dispatch), 64, Some(183)),
     entry(3, Some(Global::Dispatch), 64, Some(184)),
     entry(3, Some(Global::Dispatch), 64, Some(185)),
+    entry(3, Some(Global::Dispatch), 64, Some(186)),
+    entry(3, Some(Global::Dispatch), 64, Some(187)),
+    entry(3, Some(Global::Dispatch), 64, Some(188)),
+    entry(3, Some(Global::Dispatch), 64, Some(189)),
+    entry(3, Some(Global::Dispatch), 64, Some(190)),
+    entry(3, Some(Global::Dispatch), 64, Some(191)),
     entry(4, Some(Global::Dispatch), 64, None),
     entry(4, Some(Global::Dispatch), 64, None),
     entry(4, Some(Global::Dispatch), 64, None),
@@ -331,33 +339,33 @@ pub(crate) static ENTRIES: [Entry; 220] = [
     entry(2, Some(Global::Dispatch), 128, None),
     entry(2, Some(Global::Dispatch), 128, None),
     entry(2, Some(Global::Dispatch), 128, None),
-    entry(1, Some(Global::Dispatch), 64, Some(186)),
-    entry(1, Some(Global::Dispatch), 64, Some(187)),
-    entry(1, Some(Global::Dispatch), 64, Some(188)),
-    entry(1, Some(Global::Dispatch), 64, Some(189)),
-    entry(1, Some(Global::Dispatch), 64, Some(190)),
-    entry(1, Some(Global::Dispatch), 64, Some(191)),
     entry(1, Some(Global::Dispatch), 64, Some(192)),
     entry(1, Some(Global::Dispatch), 64, Some(193)),
     entry(1, Some(Global::Dispatch), 64, Some(194)),
-    entry(2, Some(Global::Dispatch), 64, Some(195)),
-    entry(2, Some(Global::Dispatch), 64, Some(196)),
-    entry(2, Some(Global::Dispatch), 64, Some(197)),
-    entry(2, Some(Global::Dispatch), 64, Some(198)),
-    entry(2, Some(Global::Dispatch), 64, Some(199)),
-    entry(2, Some(Global::Dispatch), 64, Some(200)),
+    entry(1, Some(Global::Dispatch), 64, Some(195)),
+    entry(1, Some(Global::Dispatch), 64, Some(196)),
+    entry(1, Some(Global::Dispatch), 64, Some(197)),
+    entry(1, Some(Global::Dispatch), 64, Some(198)),
+    entry(1, Some(Global::Dispatch), 64, Some(199)),
+    entry(1, Some(Global::Dispatch), 64, Some(200)),
     entry(2, Some(Global::Dispatch), 64, Some(201)),
     entry(2, Some(Global::Dispatch), 64, Some(202)),
     entry(2, Some(Global::Dispatch), 64, Some(203)),
-    entry(3, Some(Global::Dispatch), 64, Some(204)),
-    entry(3, Some(Global::Dispatch), 64, Some(205)),
-    entry(3, Some(Global::Dispatch), 64, Some(206)),
-    entry(3, Some(Global::Dispatch), 64, Some(207)),
-    entry(3, Some(Global::Dispatch), 64, Some(208)),
-    entry(3, Some(Global::Dispatch), 64, Some(209)),
+    entry(2, Some(Global::Dispatch), 64, Some(204)),
+    entry(2, Some(Global::Dispatch), 64, Some(205)),
+    entry(2, Some(Global::Dispatch), 64, Some(206)),
+    entry(2, Some(Global::Dispatch), 64, Some(207)),
+    entry(2, Some(Global::Dispatch), 64, Some(208)),
+    entry(2, Some(Global::Dispatch), 64, Some(209)),
     entry(3, Some(Global::Dispatch), 64, Some(210)),
     entry(3, Some(Global::Dispatch), 64, Some(211)),
     entry(3, Some(Global::Dispatch), 64, Some(212)),
+    entry(3, Some(Global::Dispatch), 64, Some(213)),
+    entry(3, Some(Global::Dispatch), 64, Some(214)),
+    entry(3, Some(Global::Dispatch), 64, Some(215)),
+    entry(3, Some(Global::Dispatch), 64, Some(216)),
+    entry(3, Some(Global::Dispatch), 64, Some(217)),
+    entry(3, Some(Global::Dispatch), 64, Some(218)),
     entry(4, Some(Global::Dispatch), 64, None),
     entry(4, Some(Global::Dispatch), 64, None),
     entry(4, Some(Global::Dispatch), 64, None),
@@ -394,19 +402,21 @@ pub(crate) static ENTRIES: [Entry; 220] = [
     entry(2, Some(Global::Dispatch), 128, None),
     entry(2, Some(Global::Dispatch), 128, None),
     entry(2, Some(Global::Dispatch), 128, None),
-    entry(6, Some(Global::Rows), 64, Some(213)),
-    entry(6, Some(Global::Rows), 64, Some(214)),
-    entry(7, Some(Global::Rows), 64, Some(215)),
+    entry(6, Some(Global::Rows), 64, Some(219)),
+    entry(6, Some(Global::Rows), 64, Some(220)),
+    entry(7, Some(Global::Rows), 64, Some(221)),
     entry(8, Some(Global::Dispatch), 64, None),
     entry(9, Some(Global::Dispatch), 64, None),
     entry(10, Some(Global::Dispatch), 64, None),
     entry(11, Some(Global::Dispatch), 64, None),
     entry(12, Some(Global::Dispatch), 64, None),
     entry(13, Some(Global::Dispatch), 64, None),
-    entry(14, Some(Global::Dispatch), 64, Some(216)),
-    entry(14, Some(Global::Dispatch), 64, Some(217)),
-    entry(14, Some(Global::Dispatch), 64, Some(218)),
-    entry(14, Some(Global::Dispatch), 64, Some(219)),
+    entry(14, Some(Global::Dispatch), 64, Some(222)),
+    entry(14, Some(Global::Dispatch), 64, Some(223)),
+    entry(14, Some(Global::Dispatch), 64, Some(224)),
+    entry(14, Some(Global::Dispatch), 64, Some(225)),
+    entry(14, Some(Global::Dispatch), 64, Some(226)),
+    entry(14, Some(Global::Dispatch), 64, Some(227)),
     entry(15, Some(Global::Dispatch), 64, None),
     entry(16, Some(Global::Dispatch), 64, None),
     entry(17, Some(Global::Dispatch), 64, None),
@@ -418,6 +428,8 @@ pub(crate) static ENTRIES: [Entry; 220] = [
     entry(21, Some(Global::Dispatch), 64, None),
     entry(22, Some(Global::Dispatch), 64, None),
     entry(22, Some(Global::Dispatch), 64, None),
+    entry(21, Some(Global::Dispatch), 64, None),
+    entry(22, Some(Global::Dispatch), 64, None),
     entry(23, Some(Global::Dispatch), 64, None),
     entry(23, Some(Global::Dispatch), 64, None),
     entry(24, Some(Global::Dispatch), 64, None),
@@ -426,6 +438,8 @@ pub(crate) static ENTRIES: [Entry; 220] = [
     entry(27, Some(Global::Dispatch), 64, None),
     entry(27, Some(Global::Dispatch), 64, None),
     entry(28, Some(Global::Dispatch), 64, None),
+    entry(29, Some(Global::Dispatch), 64, None),
+    entry(30, Some(Global::Dispatch), 64, None),
     entry(1, Some(Global::Dispatch), 64, None),
     entry(1, Some(Global::Dispatch), 64, None),
     entry(1, Some(Global::Dispatch), 64, None),
@@ -483,6 +497,8 @@ pub(crate) static ENTRIES: [Entry; 220] = [
     entry(6, Some(Global::Rows), 64, None),
     entry(6, Some(Global::Rows), 64, None),
     entry(7, Some(Global::Rows), 64, None),
+    entry(14, Some(Global::Dispatch), 64, None),
+    entry(14, Some(Global::Dispatch), 64, None),
     entry(14, Some(Global::Dispatch), 64, None),
     entry(14, Some(Global::Dispatch), 64, None),
     entry(14, Some(Global::Dispatch), 64, None),
@@ -800,6 +816,21 @@ pub(crate) struct TangentWeights<F> {
 stored!(TangentWeights, (<F>), 4, before 0, after 1, outgoing 2, kind 3);
 
 #[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct TreeFrame<F> {
+    pub(crate) offset: [F; 3],
+    pub(crate) above: u32,
+    pub(crate) rest: [F; 4],
+    pub(crate) axis: [F; 3],
+    pub(crate) kind: u32,
+    pub(crate) source: u32,
+    pub(crate) root: u32,
+    pub(crate) multiplier: F,
+    pub(crate) shift: F,
+}
+
+stored!(TreeFrame, (<F>), 16, offset 0, above 3, rest 4, axis 8, kind 11, source 12, root 13, multiplier 14, shift 15);
+
+#[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct TwoKeysHoisted<F> {
     pub(crate) parameter: F,
 }
@@ -886,6 +917,30 @@ pub(crate) fn arc_between<M: Machine>(
     }
 }
 
+pub(crate) fn arc_of_keys<M: Machine>(
+    machine: &M,
+    channel: CrowdChannel,
+    at: CrowdPosition<M::F>,
+) -> [M::F; 4] {
+    let _block = machine.block(line!(), 14);
+    let key = channel
+        .first
+        .wrapping_add((at.span & TICKS).wrapping_mul(channel.count));
+    let start = cell_at(machine, key);
+    if at.span & ON_KEY != 0u32 {
+        let _block = machine.block(line!(), 1);
+        let result = authored_key(machine, start);
+        return result;
+    }
+    let end = cell_at(machine, key.wrapping_add(channel.count));
+    let result_2 = continued_key(machine, start);
+    let result_3 = continued_key(machine, end);
+    let result_4 = arc_between(machine, result_2, result_3);
+    let result_5 = evaluate_arc_segment(machine, result_4, at.parameter);
+    let result_6 = canonical(machine, result_5);
+    result_6
+}
+
 /// The angle of the point (x, y), from -pi to pi; 0 for (0, 0).
 pub(crate) fn arc_tangent<M: Machine>(machine: &M, y: M::F, x: M::F) -> M::F {
     let _block = machine.block(line!(), 10);
@@ -949,6 +1004,20 @@ pub(crate) fn as_stored<M: Machine>(machine: &M, stored: [u32; 4]) -> [M::F; 4] 
         [stored[1], stored[2], stored[3]][2],
     ]
     .map(|x| M::F::of_bits(x))
+}
+
+pub(crate) fn authored_key<M: Machine>(machine: &M, stored: [M::F; 4]) -> [M::F; 4] {
+    let _block = machine.block(line!(), 5);
+    let result = norm_squared(machine, stored);
+    let result_2 = canonical(
+        machine,
+        if result > M::F::of(LONGEST_KEY) {
+            both(stored, [M::F::of(-0.25); 4], |x, y| x * y)
+        } else {
+            stored
+        },
+    );
+    result_2
 }
 
 pub(crate) fn axis_angle<M: Machine>(machine: &M, rotation: [M::F; 4]) -> [M::F; 4] {
@@ -1028,15 +1097,15 @@ pub(crate) fn canonical_product<M: Machine>(
 }
 
 pub(crate) fn cell_at<M: Machine>(machine: &M, index: u32) -> [M::F; 4] {
-    const OF_KERNELS: [u8; 220] = [
+    const OF_KERNELS: [u8; 228] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 1, 1, 1, 1,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1,
     ];
     match OF_KERNELS[machine.code()] {
         0 => cell_at_of_readers(machine, index),
@@ -1080,15 +1149,15 @@ pub(crate) fn cell_of<M: Machine>(machine: &M, corner: Corner, iteration: u32) -
 }
 
 pub(crate) fn channel_at<M: Machine>(machine: &M, index: u32) -> CrowdChannel {
-    const OF_KERNELS: [u8; 220] = [
+    const OF_KERNELS: [u8; 228] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 1, 1, 1, 1,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1,
     ];
     match OF_KERNELS[machine.code()] {
         0 => channel_at_of_readers(machine, index),
@@ -1147,15 +1216,15 @@ pub(crate) fn composed<M: Machine>(
 }
 
 pub(crate) fn constant_at<M: Machine>(machine: &M, index: u32) -> [M::F; 4] {
-    const OF_KERNELS: [u8; 220] = [
+    const OF_KERNELS: [u8; 228] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
         1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
         1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
         1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
-        1, 1, 1, 0, 0, 0, 0, 0, 0, 0,
+        1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => constant_at_of_readers(machine, index),
@@ -1247,6 +1316,16 @@ pub(crate) fn continued<M: Machine>(machine: &M, stored: [u32; 4]) -> [M::F; 4] 
     .map(|x| M::F::of_bits(x))
 }
 
+pub(crate) fn continued_key<M: Machine>(machine: &M, stored: [M::F; 4]) -> [M::F; 4] {
+    let _block = machine.block(line!(), 4);
+    let result = norm_squared(machine, stored);
+    if result > M::F::of(LONGEST_KEY) {
+        both(stored, [M::F::of(0.25); 4], |x, y| x * y)
+    } else {
+        stored
+    }
+}
+
 pub(crate) fn continued_key_at<M: Machine>(machine: &M, key: u32) -> [M::F; 4] {
     let _block = machine.block(line!(), 2);
     let result = key_at(machine, key);
@@ -1290,15 +1369,15 @@ pub(crate) fn cross3<M: Machine>(machine: &M, a: [M::F; 3], b: [M::F; 3]) -> [M:
 }
 
 pub(crate) fn crowd_work<M: Machine>(machine: &M, index: u32) {
-    const OF_KERNELS: [u8; 220] = [
+    const OF_KERNELS: [u8; 228] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 2, 3, 4, 5, 0, 6, 7, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 0, 1, 2, 3, 4, 5, 0, 6, 7, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 1, 1,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 0, 1,
     ];
     match OF_KERNELS[machine.code()] {
         0 => crowd_work_of_rotations(machine, index),
@@ -1528,20 +1607,97 @@ pub(crate) fn cubic<M: Machine>(
     )
 }
 
+/// The group of a channel has a row for each key: a cell with the weights of its tangent, cells with the sources of the
+/// intervals after the keys, one word for each channel, and the keys. `channel.keys` is the cell of the first weights.
+pub(crate) fn cubic_of_keys<M: Machine>(
+    machine: &M,
+    channel: CrowdChannel,
+    at: CrowdPosition<M::F>,
+) -> [M::F; 4] {
+    let _block = machine.block(line!(), 58);
+    let before_keys = 1u32.wrapping_add(channel.count.wrapping_add(3u32) >> 2u32);
+    let stride = channel.count.wrapping_add(before_keys);
+    let along = (at.span & TICKS).wrapping_mul(stride);
+    let key = channel.first.wrapping_add(along);
+    let start = cell_at(machine, key);
+    if at.span & ON_KEY != 0u32 {
+        let _block = machine.block(line!(), 1);
+        let result = authored_key(machine, start);
+        return result;
+    }
+    let row = channel.keys.wrapping_add(along);
+    let member = channel
+        .first
+        .wrapping_sub(channel.keys)
+        .wrapping_sub(before_keys);
+    let result_2 = cell_at(machine, row.wrapping_add(1u32).wrapping_add(member >> 2u32));
+    let source = source_of(machine, result_2.map(|x| x.bits()), member & 3u32);
+    if source != 0u32 {
+        let _block = machine.block(line!(), 1);
+        let result_3 = segment_of_3(machine, channel.keys, source, at.parameter);
+        return result_3;
+    }
+    let result_4 = cell_at(machine, row);
+    let first = weights_in(machine, result_4);
+    let result_5 = cell_at(machine, row.wrapping_add(stride));
+    let last = weights_in(machine, result_5);
+    let before = if first.kind == M::F::of(KEY_INNER) {
+        key.wrapping_sub(stride)
+    } else {
+        key
+    };
+    let next = key.wrapping_add(stride);
+    let after = if last.kind == M::F::of(KEY_INNER) {
+        next.wrapping_add(stride)
+    } else {
+        next
+    };
+    let result_6 = cell_at(machine, before);
+    let result_7 = continued_key(machine, result_6);
+    let result_8 = continued_key(machine, start);
+    let result_9 = cell_at(machine, next);
+    let result_10 = continued_key(machine, result_9);
+    let result_11 = cell_at(machine, after);
+    let result_12 = continued_key(machine, result_11);
+    let curve = small_angle_cubic(
+        machine, result_7, result_8, result_10, result_12, first, last,
+    );
+    let c = curve.powers;
+    let s = at.parameter;
+    let z = s * s;
+    let third = both(both(c[3], [s; 4], |x, y| x * y), c[2], |x, y| x + y);
+    let high = both(
+        both(c[6], [z; 4], |x, y| x * y),
+        both(both(c[5], [s; 4], |x, y| x * y), c[4], |x, y| x + y),
+        |x, y| x + y,
+    );
+    let gain = both(
+        both(high, [z * z; 4], |x, y| x * y),
+        both(
+            both(third, [z; 4], |x, y| x * y),
+            both(c[1], [s; 4], |x, y| x * y),
+            |x, y| x + y,
+        ),
+        |x, y| x + y,
+    );
+    let result_13 = canonical(machine, both(c[0], gain, |x, y| x + y));
+    result_13
+}
+
 pub(crate) fn cubic_value<M: Machine>(
     machine: &M,
     channel: CrowdChannel,
     at: CrowdPosition<M::F>,
 ) -> [M::F; 4] {
-    const OF_KERNELS: [u8; 220] = [
+    const OF_KERNELS: [u8; 228] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0,
-        1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        1, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => cubic_value_of_plain_cubic(machine, channel, at),
@@ -1634,15 +1790,15 @@ pub(crate) fn cubic_value_of_cubic_or_constant<M: Machine>(
 }
 
 pub(crate) fn distance_at<M: Machine>(machine: &M, index: u32) -> M::F {
-    const OF_KERNELS: [u8; 220] = [
+    const OF_KERNELS: [u8; 228] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1,
+        1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => distance_at_of_readers(machine, index),
@@ -1668,15 +1824,15 @@ pub(crate) fn distance_at_of_readers_2<M: Machine>(machine: &M, index: u32) -> M
 }
 
 pub(crate) fn distance_from_middle<M: Machine>(machine: &M, first: i32, j: u32) -> M::F {
-    const OF_KERNELS: [u8; 220] = [
+    const OF_KERNELS: [u8; 228] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1,
         1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1,
         1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1,
+        1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => distance_from_middle_of_frame_distance(machine, first, j),
@@ -1719,15 +1875,15 @@ pub(crate) fn dot4<M: Machine>(machine: &M, a: [M::F; 4], b: [M::F; 4]) -> M::F 
 }
 
 pub(crate) fn entry_at<M: Machine>(machine: &M, index: u32) -> CrowdEntry {
-    const OF_KERNELS: [u8; 220] = [
+    const OF_KERNELS: [u8; 228] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1,
-        1, 2, 2, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1,
+        1, 1, 1, 1, 1, 2, 2, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 2, 2, 2, 2,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 2, 2, 2, 2, 2, 2,
     ];
     match OF_KERNELS[machine.code()] {
         0 => entry_at_of_readers(machine, index),
@@ -2042,7 +2198,7 @@ pub(crate) async fn finish_2<M: Machine>(
     rotation: [M::F; 4],
     is_stored: bool,
 ) {
-    const OF_KERNELS: [u8; 220] = [
+    const OF_KERNELS: [u8; 228] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1,
         0, 0, 2, 3, 4, 0, 1, 0, 1, 0, 0, 2, 3, 4, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
@@ -2050,7 +2206,7 @@ pub(crate) async fn finish_2<M: Machine>(
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => finish_2_of_alone(machine, lane, index, rotation, is_stored).await,
@@ -2524,15 +2680,15 @@ pub(crate) async fn is_any<M: Machine>(machine: &M, condition: bool) -> bool {
 }
 
 pub(crate) fn item_at_item<M: Machine>(machine: &M, index: u32) -> Item<M::F> {
-    const OF_KERNELS: [u8; 220] = [
+    const OF_KERNELS: [u8; 228] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
+        1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => item_at_item_of_readers(machine, index),
@@ -2727,8 +2883,31 @@ pub(crate) fn laid_over<M: Machine>(
     result_6
 }
 
-/// The `kind`th channel of a joint in one layer; `layer` counts within the window.
 pub(crate) fn layer_value<M: Machine>(
+    machine: &M,
+    layer: u32,
+    entry: CrowdEntry,
+    joint: u32,
+    kind: u32,
+) -> [M::F; 4] {
+    const OF_KERNELS: [u8; 228] = [
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1,
+    ];
+    match OF_KERNELS[machine.code()] {
+        0 => layer_value_of_layer_value(machine, layer, entry, joint, kind),
+        _ => layer_value_of_compact(machine, layer, entry, joint, kind),
+    }
+}
+
+/// The `kind`th channel of a joint in one layer; `layer` counts within the window.
+pub(crate) fn layer_value_of_layer_value<M: Machine>(
     machine: &M,
     layer: u32,
     entry: CrowdEntry,
@@ -2756,16 +2935,61 @@ pub(crate) fn layer_value<M: Machine>(
     result
 }
 
+/// The `kind`th channel of a joint in one layer; `layer` counts within the window.
+pub(crate) fn layer_value_of_compact<M: Machine>(
+    machine: &M,
+    layer: u32,
+    entry: CrowdEntry,
+    joint: u32,
+    kind: u32,
+) -> [M::F; 4] {
+    let _block = machine.block(line!(), 20);
+    let clip = entry.clip_and_weight & 0xffffu32;
+    let loaded = machine.load::<u32>(Global::Dispatch, 2);
+    let channel = channel_at(
+        machine,
+        clip.wrapping_mul(loaded)
+            .wrapping_add(joint)
+            .wrapping_mul(CHANNELS)
+            .wrapping_add(kind),
+    );
+    let loaded_2 = machine.load::<u32>(Global::Dispatch, 4);
+    let at = position_at(
+        machine,
+        layer
+            .wrapping_mul(loaded_2)
+            .wrapping_add(channel.form_and_base & 0xffffffu32),
+    );
+    let form = channel.form_and_base >> 24u32;
+    if form == FORM_CUBIC_KEYS {
+        let _block = machine.block(line!(), 1);
+        let result = cubic_of_keys(machine, channel, at);
+        return result;
+    }
+    if form == FORM_ARC_KEYS {
+        let _block = machine.block(line!(), 1);
+        let result_2 = arc_of_keys(machine, channel, at);
+        return result_2;
+    }
+    if form == FORM_LINE {
+        let _block = machine.block(line!(), 1);
+        let result_3 = line_of_keys(machine, channel, at);
+        return result_3;
+    }
+    let result_4 = sampled(machine, channel, at);
+    result_4
+}
+
 pub(crate) fn layered<M: Machine>(machine: &M, instance: u32, joint: u32, kind: u32) -> [M::F; 4] {
-    const OF_KERNELS: [u8; 220] = [
+    const OF_KERNELS: [u8; 228] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0,
-        1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        1, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 1, 0, 1,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 1, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => layered_of_layers(machine, instance, joint, kind),
@@ -2901,6 +3125,41 @@ pub(crate) fn line_between<M: Machine>(
     }
 }
 
+/// Halves are added, so that no sum is too large.
+pub(crate) fn line_of_keys<M: Machine>(
+    machine: &M,
+    channel: CrowdChannel,
+    at: CrowdPosition<M::F>,
+) -> [M::F; 4] {
+    let _block = machine.block(line!(), 18);
+    let key = channel
+        .first
+        .wrapping_add((at.span & TICKS).wrapping_mul(channel.count));
+    let start = cell_at(machine, key);
+    if at.span & ON_KEY != 0u32 {
+        return start;
+    }
+    let end = cell_at(machine, key.wrapping_add(channel.count));
+    let middle = canonical(
+        machine,
+        both(
+            both(start, [M::F::of(0.5); 4], |x, y| x * y),
+            both(end, [M::F::of(0.5); 4], |x, y| x * y),
+            |x, y| x + y,
+        ),
+    );
+    let result = canonical(machine, both(end, start, |x, y| x - y));
+    let result_2 = canonical(
+        machine,
+        both(
+            both(result, [at.parameter; 4], |x, y| x * y),
+            middle,
+            |x, y| x + y,
+        ),
+    );
+    result_2
+}
+
 /// Where a run of a repetition finds its segment (x) and its key (z), and stores its first sample (y).
 pub(crate) fn location_of<M: Machine>(
     machine: &M,
@@ -2928,16 +3187,16 @@ pub(crate) fn magnitude<M: Machine>(machine: &M, x: M::F) -> M::F {
 }
 
 pub(crate) async fn main<M: Machine>(machine: &M) {
-    const OF_KERNELS: [u8; 220] = [
+    const OF_KERNELS: [u8; 228] = [
         0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 2, 2, 2, 2, 2, 2, 2, 2, 2, 3, 3,
         3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 4, 5, 4, 4, 6, 7, 8, 4, 5, 4, 5, 4, 4, 6,
         7, 8, 4, 5, 9, 9, 9, 9, 9, 9, 9, 9, 9, 9, 9, 9, 9, 9, 9, 9, 9, 9, 10, 10, 10, 10, 10, 10,
         10, 10, 10, 11, 11, 11, 11, 11, 11, 11, 11, 11, 11, 11, 11, 11, 11, 11, 11, 11, 11, 12, 13,
         12, 12, 14, 15, 16, 12, 13, 12, 13, 12, 12, 14, 15, 16, 12, 13, 17, 18, 19, 20, 20, 20, 20,
-        20, 20, 21, 21, 21, 21, 21, 21, 21, 21, 22, 21, 21, 23, 23, 24, 24, 25, 25, 26, 26, 26, 26,
-        26, 27, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 2, 2, 2, 2, 2, 2, 2, 2, 2, 9,
-        9, 9, 9, 9, 9, 9, 9, 9, 9, 9, 9, 9, 9, 9, 9, 9, 9, 10, 10, 10, 10, 10, 10, 10, 10, 10, 17,
-        18, 19, 21, 21, 21, 21,
+        20, 20, 21, 21, 21, 21, 21, 21, 21, 21, 21, 21, 22, 21, 21, 23, 23, 24, 24, 23, 24, 25, 25,
+        26, 26, 26, 26, 26, 26, 26, 27, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 2, 2,
+        2, 2, 2, 2, 2, 2, 2, 9, 9, 9, 9, 9, 9, 9, 9, 9, 9, 9, 9, 9, 9, 9, 9, 9, 9, 10, 10, 10, 10,
+        10, 10, 10, 10, 10, 17, 18, 19, 21, 21, 21, 21, 21, 21,
     ];
     match OF_KERNELS[machine.code()] {
         0 => main_of_self_test(machine).await,
@@ -5887,7 +6146,7 @@ pub(crate) async fn main_of_subgroup_rotations<M: Machine>(machine: &M) {
             let _block = machine.block(line!(), 13);
             let loaded_26 = index;
             let loaded_27 = index;
-            let result_4 = rotation_at(machine, in_subgroup, loaded_27).await;
+            let result_4 = rotation_at_subgroup(machine, in_subgroup, loaded_27).await;
             store(machine, output.wrapping_add(loaded_26), result_4);
             let loaded_28 = index;
             index = loaded_28.wrapping_add(lanes);
@@ -5903,7 +6162,7 @@ pub(crate) async fn main_of_subgroup_rotations<M: Machine>(machine: &M) {
         let loaded_30 = index;
         let is_inside_2 = loaded_30 < end;
         let loaded_31 = index;
-        let value = rotation_at(
+        let value = rotation_at_subgroup(
             machine,
             in_subgroup,
             if is_inside_2 { loaded_31 } else { 0u32 },
@@ -6006,22 +6265,24 @@ pub(crate) fn matrix_rows<M: Machine>(
 }
 
 pub(crate) fn motion_work<M: Machine>(machine: &M, index: u32) {
-    const OF_KERNELS: [u8; 220] = [
+    const OF_KERNELS: [u8; 228] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 1, 2, 3, 4, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 1, 2, 3, 4, 5, 6, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => motion_work_of_joints(machine, index),
         1 => motion_work_of_walk(machine, index),
         2 => motion_work_of_differences(machine, index),
         3 => motion_work_of_store(machine, index),
-        _ => motion_work_of_matrices(machine, index),
+        4 => motion_work_of_matrices(machine, index),
+        5 => motion_work_of_tree(machine, index),
+        _ => motion_work_of_pick(machine, index),
     }
 }
 
@@ -6213,6 +6474,59 @@ pub(crate) fn motion_work_of_matrices<M: Machine>(machine: &M, index: u32) {
     }
 }
 
+/// `index` is the sample, `dispatch.joints` the number of tracks and `dispatch.links` that of frames.
+pub(crate) fn motion_work_of_tree<M: Machine>(machine: &M, index: u32) {
+    let mut i: u32 = 0u32;
+    let _block = machine.block(line!(), 5);
+    let loaded = machine.load::<u32>(Global::Dispatch, 2);
+    let first_word = index.wrapping_mul(loaded).wrapping_mul(20u32);
+    let loaded_2 = machine.load::<u32>(Global::Dispatch, 3);
+    let first = index.wrapping_mul(loaded_2);
+    loop {
+        let _block = machine.block(line!(), 13);
+        let loaded_3 = i;
+        let loaded_4 = machine.load::<u32>(Global::Dispatch, 3);
+        if !(loaded_3 < loaded_4) {
+            break;
+        }
+        let loaded_5 = i;
+        let loaded_6 = machine.load::<TreeFrame<M::F>>(Global::Frames, 16 * (loaded_5 as usize));
+        let loaded_7 = i;
+        walk_to(
+            machine,
+            loaded_6,
+            first_word,
+            first,
+            first.wrapping_add(loaded_7).wrapping_mul(STATE_VECTORS),
+        );
+        let loaded_8 = i;
+        i = loaded_8.wrapping_add(1u32);
+    }
+}
+
+/// `index` is a number of the result. Of each sample there are `dispatch.numbers`; their picks begin at `dispatch.vector`,
+/// and its states have `dispatch.joints` vectors.
+pub(crate) fn motion_work_of_pick<M: Machine>(machine: &M, index: u32) {
+    let _block = machine.block(line!(), 14);
+    let loaded = machine.load::<u32>(Global::Dispatch, 7);
+    let sample = quotient(index, loaded);
+    let loaded_2 = machine.load::<u32>(Global::Dispatch, 6);
+    let loaded_3 = machine.load::<u32>(Global::Dispatch, 7);
+    let pick = machine.load::<u32>(
+        Global::Picks,
+        loaded_2.wrapping_add(index.wrapping_sub(sample.wrapping_mul(loaded_3))) as usize,
+    );
+    let loaded_4 = machine.load::<u32>(Global::Dispatch, 2);
+    let loaded_5 = machine.load::<u32>(
+        Global::States,
+        sample
+            .wrapping_mul(loaded_4)
+            .wrapping_mul(4u32)
+            .wrapping_add(pick) as usize,
+    );
+    machine.store::<u32>(Global::Values, index as usize, loaded_5);
+}
+
 /// Stores the position and the velocity in the parent's frame.
 pub(crate) fn move_joint<M: Machine>(
     machine: &M,
@@ -6367,7 +6681,7 @@ pub(crate) fn moving_span<M: Machine>(
 }
 
 pub(crate) fn near_distance<M: Machine>(machine: &M, at: i32) -> M::F {
-    const OF_KERNELS: [u8; 220] = [
+    const OF_KERNELS: [u8; 228] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1,
         1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
@@ -6375,7 +6689,7 @@ pub(crate) fn near_distance<M: Machine>(machine: &M, at: i32) -> M::F {
         1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => near_distance_of_near_frame(machine, at),
@@ -6433,15 +6747,15 @@ pub(crate) fn parameter_in<M: Machine>(machine: &M, span: CrowdSpan<M::F>, tick:
 }
 
 pub(crate) fn parts_1<M: Machine>(machine: &M, rotation: [M::F; 4]) -> [M::F; 3] {
-    const OF_KERNELS: [u8; 220] = [
+    const OF_KERNELS: [u8; 228] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 2,
         0, 0, 0, 0, 0, 0, 1, 0, 2, 0, 0, 0, 0, 0, 0, 1, 0, 2, 0, 0, 0, 0, 0, 0, 1, 0, 2, 0, 0, 0,
         0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0,
         1, 0, 2, 0, 0, 0, 0, 0, 0, 1, 0, 2, 0, 0, 0, 0, 0, 0, 1, 0, 2, 0, 0, 0, 0, 0, 0, 1, 0, 2,
         0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0,
-        0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0,
-        0, 0, 1, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0,
+        0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1,
+        0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => parts_1_of_euler(machine, rotation),
@@ -6471,7 +6785,7 @@ pub(crate) fn parts_1_of_euler_2<M: Machine>(machine: &M, rotation: [M::F; 4]) -
 }
 
 pub(crate) fn parts_2<M: Machine>(machine: &M, rotation: [M::F; 4]) -> [M::F; 6] {
-    const OF_KERNELS: [u8; 220] = [
+    const OF_KERNELS: [u8; 228] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0,
         0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
@@ -6479,7 +6793,7 @@ pub(crate) fn parts_2<M: Machine>(machine: &M, rotation: [M::F; 4]) -> [M::F; 6]
         0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => parts_2_of_six_d(machine, rotation),
@@ -6542,7 +6856,7 @@ pub(crate) fn parts_2_of_six_d_2<M: Machine>(machine: &M, rotation: [M::F; 4]) -
 }
 
 pub(crate) fn parts_3<M: Machine>(machine: &M, rotation: [M::F; 4]) -> [M::F; 9] {
-    const OF_KERNELS: [u8; 220] = [
+    const OF_KERNELS: [u8; 228] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
@@ -6550,7 +6864,7 @@ pub(crate) fn parts_3<M: Machine>(machine: &M, rotation: [M::F; 4]) -> [M::F; 9]
         0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => parts_3_of_matrix3x3(machine, rotation),
@@ -6611,7 +6925,7 @@ pub(crate) fn parts_3_of_matrix3x3_2<M: Machine>(machine: &M, rotation: [M::F; 4
 }
 
 pub(crate) fn parts_4<M: Machine>(machine: &M, rotation: [M::F; 4]) -> [[M::F; 4]; 3] {
-    const OF_KERNELS: [u8; 220] = [
+    const OF_KERNELS: [u8; 228] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0,
         1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
@@ -6619,7 +6933,7 @@ pub(crate) fn parts_4<M: Machine>(machine: &M, rotation: [M::F; 4]) -> [[M::F; 4
         0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => parts_4_of_matrix3x4(machine, rotation),
@@ -6768,7 +7082,7 @@ pub(crate) fn polynomial<M: Machine>(machine: &M, c: [[M::F; 4]; 11], s: M::F) -
 }
 
 pub(crate) fn pose<M: Machine>(machine: &M, sample: u32) {
-    const OF_KERNELS: [u8; 220] = [
+    const OF_KERNELS: [u8; 228] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
@@ -6776,7 +7090,7 @@ pub(crate) fn pose<M: Machine>(machine: &M, sample: u32) {
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 2, 3, 4, 5, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => pose_of_add(machine, sample),
@@ -6998,15 +7312,15 @@ pub(crate) fn pose_of_world<M: Machine>(machine: &M, sample: u32) {
 }
 
 pub(crate) fn position_at<M: Machine>(machine: &M, index: u32) -> CrowdPosition<M::F> {
-    const OF_KERNELS: [u8; 220] = [
+    const OF_KERNELS: [u8; 228] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1,
-        1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1,
+        1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 2, 2, 2, 2,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 2, 2, 2, 2, 2, 2,
     ];
     match OF_KERNELS[machine.code()] {
         0 => position_at_of_readers(machine, index),
@@ -7338,8 +7652,15 @@ pub(crate) fn rotation_added<M: Machine>(
     result_4
 }
 
+pub(crate) fn rotation_at_2<M: Machine>(machine: &M, word: u32) -> [M::F; 4] {
+    let _block = machine.block(line!(), 3);
+    let result = vector_at(machine, word);
+    let loaded = machine.load::<M::F>(Global::Tracks, word.wrapping_add(3u32) as usize);
+    [result[0], result[1], result[2], loaded]
+}
+
 /// The rotation of a joint, of those of all instances of the subgroup.
-pub(crate) async fn rotation_at<M: Machine>(
+pub(crate) async fn rotation_at_subgroup<M: Machine>(
     machine: &M,
     here: Subgroup<M::F>,
     index: u32,
@@ -7535,7 +7856,7 @@ pub(crate) fn row_product<M: Machine>(
 }
 
 pub(crate) fn sample_at_key_sample<M: Machine>(machine: &M, index: u32) -> KeySample<M::F> {
-    const OF_KERNELS: [u8; 220] = [
+    const OF_KERNELS: [u8; 228] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
@@ -7543,7 +7864,7 @@ pub(crate) fn sample_at_key_sample<M: Machine>(machine: &M, index: u32) -> KeySa
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 1, 1, 1, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => sample_at_key_sample_of_readers(machine, index),
@@ -7578,15 +7899,15 @@ pub(crate) fn sample_at_key_sample_of_readers_2<M: Machine>(
 }
 
 pub(crate) fn sample_at_listed_sample<M: Machine>(machine: &M, index: u32) -> ListedSample<M::F> {
-    const OF_KERNELS: [u8; 220] = [
+    const OF_KERNELS: [u8; 228] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1,
-        1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1,
-        1, 1, 1, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => sample_at_listed_sample_of_readers(machine, index),
@@ -7766,15 +8087,15 @@ pub(crate) fn sampled<M: Machine>(
 }
 
 pub(crate) fn segment_at_arc_segment<M: Machine>(machine: &M, index: u32) -> ArcSegment<M::F> {
-    const OF_KERNELS: [u8; 220] = [
+    const OF_KERNELS: [u8; 228] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
         1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
-        1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
+        1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => segment_at_arc_segment_of_readers(machine, index),
@@ -7810,15 +8131,15 @@ pub(crate) fn segment_at_polynomial_segment<M: Machine>(
     machine: &M,
     index: u32,
 ) -> PolynomialSegment<M::F> {
-    const OF_KERNELS: [u8; 220] = [
+    const OF_KERNELS: [u8; 228] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
         1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
-        1, 1, 1, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
+        1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => segment_at_polynomial_segment_of_readers(machine, index),
@@ -7877,6 +8198,41 @@ pub(crate) fn segment_at_polynomial_segment_of_readers_2<M: Machine>(
             loaded_11.map(|x| M::F::of_bits(x)),
         ],
     }
+}
+
+/// A segment. The source says how many cells it is behind the first of its group; the lowest two bits are 0, 1 or 2 for
+/// a polynomial of degree 6, 8 or 10.
+pub(crate) fn segment_of_3<M: Machine>(machine: &M, group: u32, source: u32, s: M::F) -> [M::F; 4] {
+    let mut coefficients: [[M::F; 4]; 11] = Default::default();
+    let mut power: u32 = 0u32;
+    let _block = machine.block(line!(), 8);
+    let first = group.wrapping_add(source >> 2u32);
+    let powers = 7u32.wrapping_add((source & 3u32).wrapping_mul(2u32));
+    loop {
+        let _block = machine.block(line!(), 14);
+        let loaded = power;
+        if !(loaded < 11u32) {
+            break;
+        }
+        let loaded_2 = power;
+        let loaded_3 = power;
+        let loaded_4 = power;
+        let result = cell_at(
+            machine,
+            if loaded_4 < powers {
+                first.wrapping_add(loaded_3)
+            } else {
+                0u32
+            },
+        );
+        coefficients[loaded_2 as usize] = result;
+        let loaded_5 = power;
+        power = loaded_5.wrapping_add(1u32);
+    }
+    let loaded_6 = coefficients;
+    let result_2 = polynomial(machine, loaded_6, s);
+    let result_3 = canonical(machine, result_2);
+    result_3
 }
 
 /// Constants have no segment; the first one exists in any case.
@@ -8317,6 +8673,15 @@ pub(crate) fn small_log<M: Machine>(machine: &M, v: [M::F; 3]) -> [M::F; 3] {
     both(both(v, [tail * x; 3], |x, y| x * y), v, |x, y| x + y)
 }
 
+/// One of the four words of a cell.
+pub(crate) fn source_of<M: Machine>(machine: &M, words: [u32; 4], member: u32) -> u32 {
+    let _block = machine.block(line!(), 7);
+    let is_odd = member & 1u32 != 0u32;
+    let low = if is_odd { words[1] } else { words[0] };
+    let high = if is_odd { words[3] } else { words[2] };
+    (if member >= 2u32 { high } else { low }) & SOURCE_BITS
+}
+
 /// The last span of a time base that does not start after a tick.
 pub(crate) fn span_at<M: Machine>(machine: &M, base: CrowdBase, tick: u32) -> u32 {
     let mut found: u32 = 0u32;
@@ -8373,15 +8738,15 @@ pub(crate) fn step_vector<M: Machine>(machine: &M, a: [M::F; 4], chord: [M::F; 4
 }
 
 pub(crate) fn store<M: Machine>(machine: &M, index: u32, rotation: [M::F; 4]) {
-    const OF_KERNELS: [u8; 220] = [
+    const OF_KERNELS: [u8; 228] = [
         0, 0, 1, 2, 3, 4, 5, 6, 7, 1, 0, 1, 2, 3, 4, 5, 6, 7, 1, 0, 1, 2, 3, 4, 5, 6, 7, 1, 0, 1,
         2, 3, 4, 5, 6, 7, 1, 0, 1, 2, 3, 4, 5, 6, 7, 1, 0, 1, 2, 3, 4, 5, 6, 7, 1, 0, 1, 2, 3, 4,
         5, 6, 7, 1, 0, 1, 2, 3, 4, 5, 6, 7, 1, 0, 1, 2, 3, 4, 5, 6, 7, 1, 0, 1, 2, 3, 4, 5, 6, 7,
         1, 0, 1, 2, 3, 4, 5, 6, 7, 1, 0, 1, 2, 3, 4, 5, 6, 7, 1, 0, 1, 2, 3, 4, 5, 6, 7, 1, 0, 1,
-        2, 3, 4, 5, 6, 7, 1, 3, 3, 3, 0, 0, 0, 0, 0, 0, 3, 3, 3, 3, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 3, 2, 0, 0, 0, 0, 0, 0, 0, 1, 2, 8, 4, 5, 6, 7, 1, 0, 1, 2, 8, 4, 5, 6, 7, 1, 0, 1, 2,
-        8, 4, 5, 6, 7, 1, 0, 1, 2, 8, 4, 5, 6, 7, 1, 0, 1, 2, 8, 4, 5, 6, 7, 1, 0, 1, 2, 8, 4, 5,
-        6, 7, 1, 8, 8, 8, 8, 8, 8, 8,
+        2, 3, 4, 5, 6, 7, 1, 3, 3, 3, 0, 0, 0, 0, 0, 0, 3, 3, 3, 3, 3, 3, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 3, 2, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 2, 8, 4, 5, 6, 7, 1, 0, 1, 2, 8, 4, 5,
+        6, 7, 1, 0, 1, 2, 8, 4, 5, 6, 7, 1, 0, 1, 2, 8, 4, 5, 6, 7, 1, 0, 1, 2, 8, 4, 5, 6, 7, 1,
+        0, 1, 2, 8, 4, 5, 6, 7, 1, 8, 8, 8, 8, 8, 8, 8, 8, 8,
     ];
     match OF_KERNELS[machine.code()] {
         0 => store_of_axis_angle(machine, index, rotation),
@@ -8559,7 +8924,7 @@ pub(crate) fn store_with_care<M: Machine>(
     first_j: u32,
     repetition: u32,
 ) {
-    const OF_KERNELS: [u8; 220] = [
+    const OF_KERNELS: [u8; 228] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
@@ -8567,7 +8932,7 @@ pub(crate) fn store_with_care<M: Machine>(
         1, 1, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => store_with_care_of_alone(machine, item, location, first_j, repetition),
@@ -8738,15 +9103,15 @@ pub(crate) fn store_with_care_of_alone_2<M: Machine>(
 }
 
 pub(crate) fn tick_of<M: Machine>(machine: &M, entry: CrowdEntry, period: u32) -> u32 {
-    const OF_KERNELS: [u8; 220] = [
+    const OF_KERNELS: [u8; 228] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => tick_of_of_ticks(machine, entry, period),
@@ -9045,6 +9410,32 @@ pub(crate) fn transform_row<M: Machine>(
     result
 }
 
+/// The rotation by an angle, up to 8192 rad in magnitude, about a unit axis.
+pub(crate) fn turned<M: Machine>(machine: &M, axis: [M::F; 3], angle: M::F) -> [M::F; 4] {
+    let _block = machine.block(line!(), 23);
+    let half = angle * M::F::of(0.5);
+    let shifted = half * M::F::of(QUARTERS_PER_RADIAN) + M::F::of(WHOLE_SHIFT);
+    let quarters = shifted.bits();
+    let whole = shifted - M::F::of(WHOLE_SHIFT);
+    let rest = ((half - whole * M::F::of(QUARTER_1)) - whole * M::F::of(QUARTER_2))
+        - whole * M::F::of(QUARTER_3);
+    let sines = sine_cosine(machine, rest);
+    let is_odd = quarters & 1u32 == 1u32;
+    let sign = if quarters & 2u32 == 2u32 {
+        M::F::of(-1.0)
+    } else {
+        M::F::of(1.0)
+    };
+    let sine = (if is_odd { sines[1] } else { sines[0] }) * sign;
+    let cosine = (if is_odd { -sines[0] } else { sines[1] }) * sign;
+    [
+        both(axis, [sine; 3], |x, y| x * y)[0],
+        both(axis, [sine; 3], |x, y| x * y)[1],
+        both(axis, [sine; 3], |x, y| x * y)[2],
+        cosine,
+    ]
+}
+
 pub(crate) fn unpacked<M: Machine>(machine: &M, words: [u32; 2]) -> [M::F; 4] {
     let _block = machine.block(line!(), 30);
     let a = packed_component(machine, words[0]);
@@ -9153,6 +9544,14 @@ pub(crate) fn value_and_slope<M: Machine>(
     }
 }
 
+pub(crate) fn vector_at<M: Machine>(machine: &M, word: u32) -> [M::F; 3] {
+    let _block = machine.block(line!(), 5);
+    let loaded = machine.load::<M::F>(Global::Tracks, word as usize);
+    let loaded_2 = machine.load::<M::F>(Global::Tracks, word.wrapping_add(1u32) as usize);
+    let loaded_3 = machine.load::<M::F>(Global::Tracks, word.wrapping_add(2u32) as usize);
+    [loaded, loaded_2, loaded_3]
+}
+
 /// Makes the matrix of a joint one in the model, where its parent's is one.
 pub(crate) fn walk<M: Machine>(machine: &M, instance: u32, link: CrowdLink) {
     let _block = machine.block(line!(), 26);
@@ -9188,8 +9587,180 @@ pub(crate) fn walk<M: Machine>(machine: &M, instance: u32, link: CrowdLink) {
     );
 }
 
+/// Stores the state of a frame, which comes after the frame above it.
+pub(crate) fn walk_to<M: Machine>(
+    machine: &M,
+    frame: TreeFrame<M::F>,
+    first_word: u32,
+    first: u32,
+    state: u32,
+) {
+    let mut above: [M::F; 4] = [M::F::of(0.0), M::F::of(0.0), M::F::of(0.0), M::F::of(1.0)];
+    let mut from_root: [M::F; 3] = [M::F::of(0.0); 3];
+    let mut velocity_above: [M::F; 3] = [M::F::of(0.0); 3];
+    let mut angular_above: [M::F; 3] = [M::F::of(0.0); 3];
+    let mut arm: [M::F; 3] = Default::default();
+    let mut rotation: [M::F; 4] = Default::default();
+    let mut linear: [M::F; 3] = [M::F::of(0.0); 3];
+    let mut angular: [M::F; 3] = [M::F::of(0.0); 3];
+    let mut rate: M::F = M::F::of(0.0);
+    let mut in_world: [M::F; 4] = Default::default();
+    let _block = machine.block(line!(), 38);
+    let loaded = machine.load::<u32>(Global::Dispatch, 4);
+    let moves = loaded != 0u32;
+    if frame.above != NO_FRAME {
+        let _block = machine.block(line!(), 10);
+        let parent = first.wrapping_add(frame.above).wrapping_mul(STATE_VECTORS);
+        let loaded_2 = machine.load::<[M::F; 4]>(
+            Global::States,
+            4 * (parent.wrapping_add(WORLD_ROTATION) as usize),
+        );
+        above = loaded_2;
+        let loaded_3 = machine.load::<[M::F; 4]>(
+            Global::States,
+            4 * (parent.wrapping_add(FROM_ROOT) as usize),
+        );
+        from_root = [loaded_3[0], loaded_3[1], loaded_3[2]];
+        if moves {
+            let _block = machine.block(line!(), 8);
+            let loaded_4 = machine
+                .load::<[M::F; 4]>(Global::States, 4 * (parent.wrapping_add(VELOCITY) as usize));
+            velocity_above = [loaded_4[0], loaded_4[1], loaded_4[2]];
+            let loaded_5 = machine.load::<[M::F; 4]>(
+                Global::States,
+                4 * (parent.wrapping_add(ANGULAR_VELOCITY) as usize),
+            );
+            angular_above = [loaded_5[0], loaded_5[1], loaded_5[2]];
+        }
+    }
+    let word = first_word.wrapping_add(frame.source);
+    let loaded_6 = above;
+    let axes = product(machine, loaded_6, frame.rest);
+    let loaded_7 = above;
+    let result = rotated(machine, loaded_7, frame.offset);
+    arm = result;
+    rotation = axes;
+    if (frame.kind == FRAME_HINGE) | (frame.kind == FRAME_SLIDE) {
+        let _block = machine.block(line!(), 6);
+        let loaded_8 = machine.load::<M::F>(Global::Tracks, word as usize);
+        let value = frame.multiplier * loaded_8 + frame.shift;
+        if moves {
+            let _block = machine.block(line!(), 4);
+            let loaded_9 =
+                machine.load::<M::F>(Global::Tracks, word.wrapping_add(VECTOR_WORDS) as usize);
+            rate = frame.multiplier * loaded_9;
+        }
+        if frame.kind == FRAME_HINGE {
+            let _block = machine.block(line!(), 6);
+            let result_2 = turned(machine, frame.axis, value);
+            let result_3 = product(machine, axes, result_2);
+            rotation = result_3;
+            let loaded_10 = rate;
+            angular = both(frame.axis, [loaded_10; 3], |x, y| x * y);
+        } else {
+            let _block = machine.block(line!(), 8);
+            let loaded_11 = arm;
+            let result_4 = rotated(machine, axes, both(frame.axis, [value; 3], |x, y| x * y));
+            arm = both(loaded_11, result_4, |x, y| x + y);
+            let loaded_12 = rate;
+            linear = both(frame.axis, [loaded_12; 3], |x, y| x * y);
+        }
+    } else {
+        let _block = machine.block(line!(), 2);
+        if frame.kind != FRAME_FIXED {
+            let _block = machine.block(line!(), 7);
+            let result_5 = rotation_at_2(machine, word.wrapping_add(4u32));
+            let result_6 = product(machine, axes, result_5);
+            rotation = result_6;
+            if frame.kind == FRAME_FREE {
+                let _block = machine.block(line!(), 6);
+                let loaded_13 = arm;
+                let result_7 = vector_at(machine, word.wrapping_add(8u32));
+                let result_8 = rotated(machine, axes, result_7);
+                arm = both(loaded_13, result_8, |x, y| x + y);
+            }
+            if moves {
+                let _block = machine.block(line!(), 5);
+                let result_9 = vector_at(machine, word.wrapping_add(16u32));
+                angular = result_9;
+                if frame.kind != FRAME_BALL {
+                    let _block = machine.block(line!(), 3);
+                    let result_10 = vector_at(machine, word.wrapping_add(12u32));
+                    linear = result_10;
+                }
+            }
+        }
+    }
+    let loaded_14 = rotation;
+    let loaded_15 = rotation;
+    let result_11 = dot4(machine, loaded_14, loaded_15);
+    let scale = M::F::of(1.5) - M::F::of(0.5) * result_11;
+    let loaded_16 = rotation;
+    let result_12 = canonical(machine, both(loaded_16, [scale; 4], |x, y| x * y));
+    machine.store::<[M::F; 4]>(
+        Global::States,
+        4 * (state.wrapping_add(WORLD_ROTATION) as usize),
+        result_12,
+    );
+    let loaded_17 = from_root;
+    let loaded_18 = arm;
+    let position = canonical3(machine, both(loaded_17, loaded_18, |x, y| x + y));
+    machine.store::<[M::F; 4]>(
+        Global::States,
+        4 * (state.wrapping_add(FROM_ROOT) as usize),
+        position,
+    );
+    in_world = position;
+    if frame.root != NO_FRAME {
+        let _block = machine.block(line!(), 7);
+        let root = vector_at(
+            machine,
+            first_word.wrapping_add(frame.root).wrapping_add(8u32),
+        );
+        let result_13 = canonical3(
+            machine,
+            both([position[0], position[1], position[2]], root, |x, y| x + y),
+        );
+        in_world = result_13;
+    }
+    let loaded_19 = in_world;
+    machine.store::<[M::F; 4]>(
+        Global::States,
+        4 * (state.wrapping_add(POSITION) as usize),
+        loaded_19,
+    );
+    if moves {
+        let _block = machine.block(line!(), 18);
+        let loaded_20 = velocity_above;
+        let loaded_21 = angular_above;
+        let loaded_22 = arm;
+        let result_14 = cross3(machine, loaded_21, loaded_22);
+        let carried = both(loaded_20, result_14, |x, y| x + y);
+        let loaded_23 = linear;
+        let result_15 = rotated(machine, axes, loaded_23);
+        let result_16 = canonical3(machine, both(carried, result_15, |x, y| x + y));
+        machine.store::<[M::F; 4]>(
+            Global::States,
+            4 * (state.wrapping_add(VELOCITY) as usize),
+            result_16,
+        );
+        let loaded_24 = angular_above;
+        let loaded_25 = angular;
+        let result_17 = rotated(machine, axes, loaded_25);
+        let result_18 = canonical3(machine, both(loaded_24, result_17, |x, y| x + y));
+        machine.store::<[M::F; 4]>(
+            Global::States,
+            4 * (state.wrapping_add(ANGULAR_VELOCITY) as usize),
+            result_18,
+        );
+        return;
+    } else {
+        return;
+    }
+}
+
 pub(crate) fn weights_at<M: Machine>(machine: &M, index: u32) -> TangentWeights<M::F> {
-    const OF_KERNELS: [u8; 220] = [
+    const OF_KERNELS: [u8; 228] = [
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
@@ -9197,7 +9768,7 @@ pub(crate) fn weights_at<M: Machine>(machine: &M, index: u32) -> TangentWeights<
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-        0, 0, 0, 0, 0, 1, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0,
     ];
     match OF_KERNELS[machine.code()] {
         0 => weights_at_of_readers(machine, index),
@@ -9220,6 +9791,15 @@ pub(crate) fn weights_at_of_readers_2<M: Machine>(machine: &M, index: u32) -> Ta
         after: all[1],
         outgoing: all[2],
         kind: all[3],
+    }
+}
+
+pub(crate) fn weights_in<M: Machine>(machine: &M, cell: [M::F; 4]) -> TangentWeights<M::F> {
+    TangentWeights {
+        before: cell[0],
+        after: cell[1],
+        outgoing: cell[2],
+        kind: cell[3],
     }
 }
 

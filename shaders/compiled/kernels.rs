@@ -62,13 +62,22 @@ pub(crate) const DEGREES: f32 = 57.29578;
 pub(crate) const END_NEGATED: u32 = 2147483648;
 pub(crate) const FLUSHED_BITS: u32 = 645922816;
 pub(crate) const FORM_ARC: u32 = 1;
+pub(crate) const FORM_ARC_KEYS: u32 = 19;
 pub(crate) const FORM_CONSTANT: u32 = 0;
 pub(crate) const FORM_CUBIC: u32 = 2;
+pub(crate) const FORM_CUBIC_KEYS: u32 = 20;
 pub(crate) const FORM_KEYS: u32 = 16;
 pub(crate) const FORM_LINE: u32 = 18;
 pub(crate) const FORM_PACKED: u32 = 17;
 pub(crate) const FORM_POLYNOMIAL: u32 = 3;
+pub(crate) const FRAME_BALL: u32 = 3;
+pub(crate) const FRAME_FIXED: u32 = 0;
+pub(crate) const FRAME_FREE: u32 = 4;
+pub(crate) const FRAME_HINGE: u32 = 1;
+pub(crate) const FRAME_ROOT: u32 = 5;
+pub(crate) const FRAME_SLIDE: u32 = 2;
 pub(crate) const FROM_KEYS_WORKGROUP: u32 = 64;
+pub(crate) const FROM_ROOT: u32 = 0;
 pub(crate) const GIMBAL: f32 = 2.5e-7;
 pub(crate) const HALF_INFINITE: u32 = 31744;
 pub(crate) const HALF_OVERFLOW: u32 = 1199566848;
@@ -92,6 +101,7 @@ pub(crate) const LOG_2: f32 = 0.075;
 pub(crate) const LOG_3: f32 = 0.04464286;
 pub(crate) const LOG_4: f32 = 0.030381944;
 pub(crate) const LONGEST_ANGLE_SQUARE: f32 = 2.4674;
+pub(crate) const LONGEST_KEY: f32 = 4.0;
 pub(crate) const LONGEST_STEP: f32 = 0.0034;
 pub(crate) const LONGEST_TANGENT_PART: f32 = 0.01;
 pub(crate) const MAX_SUBGROUP_JOINTS: u32 = 1024;
@@ -103,6 +113,7 @@ pub(crate) const MAY_BE_TINY: u32 = 1073741824;
 pub(crate) const MOTION_WORKGROUP: u32 = 64;
 pub(crate) const NEEDS_CARE: u32 = 1073741824;
 pub(crate) const NEGATIVE: u32 = 128;
+pub(crate) const NO_FRAME: u32 = 4294967295;
 pub(crate) const NO_KEY: u32 = 4294967295;
 pub(crate) const ON_KEY: u32 = 2147483648;
 pub(crate) const PACKED_STEP: f32 = 1.3487017e-6;
@@ -111,6 +122,10 @@ pub(crate) const PI_LOW: f32 = -8.742278e-8;
 pub(crate) const POSE_WORKGROUP: u32 = 64;
 pub(crate) const POSITION: u32 = 2;
 pub(crate) const PREPARE_WORKGROUP: u32 = 64;
+pub(crate) const QUARTERS_PER_RADIAN: f32 = 0.63661975;
+pub(crate) const QUARTER_1: f32 = 1.5703125;
+pub(crate) const QUARTER_2: f32 = 0.0004837513;
+pub(crate) const QUARTER_3: f32 = 7.54979e-8;
 pub(crate) const QUARTER_COSINE_2: f32 = -0.5;
 pub(crate) const QUARTER_COSINE_4: f32 = 0.041666646;
 pub(crate) const QUARTER_COSINE_6: f32 = -0.0013887301;
@@ -153,6 +168,7 @@ pub(crate) const SINE_7: f32 = -0.00019806049;
 pub(crate) const SINE_9: f32 = 2.5989254e-6;
 pub(crate) const SMALL_SQUARED_EXTENT: f32 = 0.001;
 pub(crate) const SNORM_SHIFT: f32 = 12582912.0;
+pub(crate) const SOURCE_BITS: u32 = 8388607;
 pub(crate) const SPEED_MAGNITUDE: u32 = 8388607;
 pub(crate) const SPREAD_WORKGROUP: u32 = 128;
 pub(crate) const START_BIAS: u32 = 131072;
@@ -164,8 +180,10 @@ pub(crate) const TICKS: u32 = 2147483647;
 pub(crate) const TINY_BITS: u32 = 528482304;
 pub(crate) const TRANSLATION: u32 = 1;
 pub(crate) const TWO_THIRDS: f32 = 0.6666667;
+pub(crate) const VECTOR_WORDS: u32 = 4;
 pub(crate) const VELOCITY: u32 = 3;
 pub(crate) const WEIGHT_UNIT: f32 = 3.0517578e-5;
+pub(crate) const WHOLE_SHIFT: f32 = 12582912.0;
 pub(crate) const WORKGROUP: u32 = 64;
 pub(crate) const WORLD_ROTATION: u32 = 1;
 pub(crate) const WRAP_HOLD: u32 = 0;
@@ -839,6 +857,40 @@ const _: () = {
     assert!(std::mem::offset_of!(TangentWeights, outgoing) == 8);
     assert!(std::mem::offset_of!(TangentWeights, kind) == 12);
 };
+#[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub(crate) struct TreeFrame {
+/// The position in the frame above.
+    pub(crate) offset: [f32; 3],
+/// The index of the frame above, or NO_FRAME.
+    pub(crate) above: u32,
+/// The rotation in the frame above, before the joint moves it.
+    pub(crate) rest: [f32; 4],
+/// The unit axis of a hinge or a slide, after `rest`.
+    pub(crate) axis: [f32; 3],
+/// How it moves: a FRAME_….
+    pub(crate) kind: u32,
+/// Where the states of a sample's tracks have its motion, in words: the coordinate of a hinge or a slide, else the
+/// first word of its track.
+    pub(crate) source: u32,
+/// The first word of the track whose position is added last, or NO_FRAME.
+    pub(crate) root: u32,
+/// A hinge turns by `multiplier * coordinate + shift`, a slide is moved so far.
+    pub(crate) multiplier: f32,
+    pub(crate) shift: f32,
+}
+const _: () = {
+    assert!(size_of::<TreeFrame>() == 64);
+    assert!(std::mem::offset_of!(TreeFrame, offset) == 0);
+    assert!(std::mem::offset_of!(TreeFrame, above) == 12);
+    assert!(std::mem::offset_of!(TreeFrame, rest) == 16);
+    assert!(std::mem::offset_of!(TreeFrame, axis) == 32);
+    assert!(std::mem::offset_of!(TreeFrame, kind) == 44);
+    assert!(std::mem::offset_of!(TreeFrame, source) == 48);
+    assert!(std::mem::offset_of!(TreeFrame, root) == 52);
+    assert!(std::mem::offset_of!(TreeFrame, multiplier) == 56);
+    assert!(std::mem::offset_of!(TreeFrame, shift) == 60);
+};
 /// A kernel, by its name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Kernel {
@@ -982,6 +1034,8 @@ pub(crate) enum Kernel {
     CrowdPlainRotations,
     CrowdLocals,
     CrowdPlainLocals,
+    CrowdCompactRotations,
+    CrowdCompactLocals,
     CrowdGather,
     CrowdScatter,
     CrowdTimes,
@@ -993,6 +1047,8 @@ pub(crate) enum Kernel {
     CrowdPlainWholeRotations,
     CrowdWholeMatrices,
     CrowdPlainWholeMatrices,
+    CrowdCompactWholeRotations,
+    CrowdCompactWholeMatrices,
     CrowdSubgroupRotations,
     CrowdSubgroupRotationsF16,
     MotionJoints,
@@ -1000,6 +1056,8 @@ pub(crate) enum Kernel {
     MotionDifferences,
     MotionStore,
     MotionMatrices,
+    MotionTree,
+    MotionPick,
     PrepareArcs,
 }
 /// How the work over segments is listed.
@@ -1159,7 +1217,7 @@ impl Kernel {
         }
     }
 }
-pub(crate) static KERNELS: [KernelCode; 159] = [
+pub(crate) static KERNELS: [KernelCode; 165] = [
     KernelCode { kernel: Kernel::SelfTest, storage: ("self_test", 1946), texels: None, converting: None, bindings: &[Read, Write], segments: None, subgroups: false },
     KernelCode { kernel: Kernel::ArcFramesAxisAngle, storage: ("arc_frames_axis_angle", 2963), texels: Some(("arc_frames_axis_angle_texels", 3089)), converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::Frames, Store::AxisAngle)), subgroups: false },
     KernelCode { kernel: Kernel::ArcFramesEuler, storage: ("arc_frames_euler", 3619), texels: Some(("arc_frames_euler_texels", 3737)), converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::Frames, Store::Euler)), subgroups: false },
@@ -1300,6 +1358,8 @@ pub(crate) static KERNELS: [KernelCode; 159] = [
     KernelCode { kernel: Kernel::CrowdPlainRotations, storage: ("crowd_plain_rotations", 2408), texels: Some(("crowd_plain_rotations_texels", 2500)), converting: None, bindings: &[Read, Read, Read, Read, Write], segments: None, subgroups: false },
     KernelCode { kernel: Kernel::CrowdLocals, storage: ("crowd_locals", 6392), texels: Some(("crowd_locals_texels", 6478)), converting: None, bindings: &[Read, Read, Read, Read, Write], segments: None, subgroups: false },
     KernelCode { kernel: Kernel::CrowdPlainLocals, storage: ("crowd_plain_locals", 3009), texels: Some(("crowd_plain_locals_texels", 3101)), converting: None, bindings: &[Read, Read, Read, Read, Write], segments: None, subgroups: false },
+    KernelCode { kernel: Kernel::CrowdCompactRotations, storage: ("crowd_compact_rotations", 11720), texels: Some(("crowd_compact_rotations_texels", 11802)), converting: None, bindings: &[Read, Read, Read, Read, Write], segments: None, subgroups: false },
+    KernelCode { kernel: Kernel::CrowdCompactLocals, storage: ("crowd_compact_locals", 12317), texels: Some(("crowd_compact_locals_texels", 12399)), converting: None, bindings: &[Read, Read, Read, Read, Write], segments: None, subgroups: false },
     KernelCode { kernel: Kernel::CrowdGather, storage: ("crowd_gather", 565), texels: None, converting: None, bindings: &[Read, Read, Write], segments: None, subgroups: false },
     KernelCode { kernel: Kernel::CrowdScatter, storage: ("crowd_scatter", 463), texels: None, converting: None, bindings: &[Read, Write], segments: None, subgroups: false },
     KernelCode { kernel: Kernel::CrowdTimes, storage: ("crowd_times", 2463), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Write], segments: None, subgroups: false },
@@ -1311,6 +1371,8 @@ pub(crate) static KERNELS: [KernelCode; 159] = [
     KernelCode { kernel: Kernel::CrowdPlainWholeRotations, storage: ("crowd_plain_whole_rotations", 5294), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Read, Read, Write, Write], segments: None, subgroups: false },
     KernelCode { kernel: Kernel::CrowdWholeMatrices, storage: ("crowd_whole_matrices", 10662), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Read, Read, Read, Read, Write, Write], segments: None, subgroups: false },
     KernelCode { kernel: Kernel::CrowdPlainWholeMatrices, storage: ("crowd_plain_whole_matrices", 7321), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Read, Read, Read, Read, Write, Write], segments: None, subgroups: false },
+    KernelCode { kernel: Kernel::CrowdCompactWholeRotations, storage: ("crowd_compact_whole_rotations", 14552), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Read, Read, Write, Write], segments: None, subgroups: false },
+    KernelCode { kernel: Kernel::CrowdCompactWholeMatrices, storage: ("crowd_compact_whole_matrices", 16575), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Read, Read, Read, Read, Write, Write], segments: None, subgroups: false },
     KernelCode { kernel: Kernel::CrowdSubgroupRotations, storage: ("crowd_subgroup_rotations", 4538), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Read, Read, Write], segments: None, subgroups: true },
     KernelCode { kernel: Kernel::CrowdSubgroupRotationsF16, storage: ("crowd_subgroup_rotations_f16", 4786), texels: None, converting: Some(("crowd_subgroup_rotations_f16_converting", 4619)), bindings: &[Read, Read, Read, Read, Read, Read, Write], segments: None, subgroups: true },
     KernelCode { kernel: Kernel::MotionJoints, storage: ("motion_joints", 8606), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Read, Read, Write], segments: None, subgroups: false },
@@ -1318,5 +1380,7 @@ pub(crate) static KERNELS: [KernelCode; 159] = [
     KernelCode { kernel: Kernel::MotionDifferences, storage: ("motion_differences", 3601), texels: None, converting: None, bindings: &[Read, ReadWrite], segments: None, subgroups: false },
     KernelCode { kernel: Kernel::MotionStore, storage: ("motion_store", 631), texels: None, converting: None, bindings: &[Read, Write], segments: None, subgroups: false },
     KernelCode { kernel: Kernel::MotionMatrices, storage: ("motion_matrices", 1157), texels: None, converting: None, bindings: &[Read, Write], segments: None, subgroups: false },
+    KernelCode { kernel: Kernel::MotionTree, storage: ("motion_tree", 5059), texels: None, converting: None, bindings: &[Read, Read, ReadWrite], segments: None, subgroups: false },
+    KernelCode { kernel: Kernel::MotionPick, storage: ("motion_pick", 689), texels: None, converting: None, bindings: &[Read, Read, Write], segments: None, subgroups: false },
     KernelCode { kernel: Kernel::PrepareArcs, storage: ("prepare_arcs", 1870), texels: None, converting: None, bindings: &[Read, Read, Write], segments: None, subgroups: false },
 ];
