@@ -200,7 +200,6 @@ mod tests {
     use crate::work::recording::tests::letters;
 
     fn steps(arrays: &[StateArray], are_differences: bool, links: u32) -> String {
-    fn steps(arrays: &[StateArray], are_differences: bool, links: u32) -> String {
         let all = [Encoding::F32, Encoding::SixD].map(|rotations| {
             let stored = arrays.iter().map(|array| array.stored(3, rotations));
             let stored: Vec<StoredArray> = stored.collect();
@@ -239,7 +238,7 @@ mod tests {
             are_differences,
             instances: 5,
         };
-        let ranges = StateArray::ranges(arrays, rotations, 15);
+        let ranges = StoredArray::ranges(arrays, 5);
         record_window(&mut recording, &shape, &resources, 0..5, &ranges);
         letters(&recording).replace("[Kernel>Kernel]", "|")
     }
