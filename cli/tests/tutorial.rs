@@ -113,7 +113,7 @@ fn the_pictures_of_retargeting_are_those_of_the_commands() {
     let folder = check("docs/retarget.md", 6);
     for name in ["vrm", "mixamo", "smpl"] {
         let picture = format!("docs/retarget/{name}.png");
-        let [made, kept] = [folder.path(), root()].map(|folder| folder.join(&picture));
+        let [made, kept] = [folder.path(), &root()].map(|folder| folder.join(&picture));
         if std::env::var_os("UPDATE_EXPECTED").is_some() {
             fs::copy(&made, &kept).unwrap();
         }

@@ -289,7 +289,8 @@ impl Arguments {
 /// Says that the weights of morph targets stay as they are, if some are those of one side.
 fn note_weights(name: &str, clips: &[&Motion]) {
     for clip in clips {
-        let weights: Vec<&str> = clip.scalar_keys().map(|keys| keys.name).collect();
+        let weights = (0..clip.set.scalar_count()).filter_map(|index| clip.set.scalar(index));
+        let weights: Vec<&str> = weights.map(|keys| keys.name).collect();
         let in_place: Vec<usize> = (0..weights.len()).collect();
         let of_sides = without_partner(&weights, &in_place);
         if let Some(&first) = of_sides.first() {

@@ -49,7 +49,6 @@ pub fn mirror_pairs<T: AsRef<str>>(names: &[T]) -> Vec<usize> {
         let only = by_bare_name.entry(without_serial(name));
         only.and_modify(|only| *only = None).or_insert(Some(index));
     }
-    let renamed = |name| on_other_side(name).chain(by_initial(name));
     let partner = |name: &str| {
         let exact = renamed(name).find_map(|other| by_name.get(&*other).copied());
         let bare = without_serial(name);
@@ -60,6 +59,11 @@ pub fn mirror_pairs<T: AsRef<str>>(names: &[T]) -> Vec<usize> {
     let names = names.iter().enumerate();
     let pairs = names.map(|(index, name)| partner(name.as_ref()).unwrap_or(index));
     pairs.collect()
+}
+
+/// The name with the other side, in each of the ways in which names have sides.
+fn renamed(name: &str) -> impl Iterator<Item = String> {
+    on_other_side(name).chain(by_initial(name))
 }
 
 /// A name without the number that some exporters write behind each: `LeftHand` of `LeftHand_011`.
