@@ -7,7 +7,7 @@ use tumble::{Device, Engine, EulerSequence, SampleTimes};
 use tumble_formats::dialect::write::WrittenDialect;
 use tumble_formats::format::{FormatOption, MotionOptions};
 use tumble_formats::learning::{Mirror, MirrorError, mirrored, without_partner};
-use tumble_formats::motion::Motion;
+use tumble_formats::motion::{Motion, ScalarKind};
 use tumble_formats::printable::printable;
 use tumble_formats::quaternion::ComponentOrder;
 use tumble_formats::sample::ChannelMethods;
@@ -186,6 +186,11 @@ impl Arguments {
         };
         let in_place: Vec<usize> = (0..report.alone.len()).collect();
         warn_of_lost_partners(name, &report.alone, &in_place);
+        // Weights of morph targets alone are no joints.
+        let mut scalars = (0..clip.set.scalar_count()).map(|index| clip.scalar(index).kind);
+        if clip.set.track_count() == 0 && scalars.all(|kind| kind == ScalarKind::Plain) {
+            return Ok(Cow::Owned(mirrored));
+        }
         let pairs = words::count(report.pairs.len(), "pair");
         let alone = match report.alone.len() {
             0 => "no joint is".to_owned(),
