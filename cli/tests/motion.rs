@@ -844,8 +844,10 @@ fn mirrored_animations_keep_weights_and_names() {
         }
         assert_eq!(animations[0]["extras"]["mood"], 1.5);
         assert_eq!(animations[0]["channels"][0]["target"]["path"], "weights");
-        assert_eq!(animations[1], before["animations"][1]);
-        assert_eq!(animations[2], before["animations"][2]);
+        for index in [1, 2] {
+            let channels = &animations[index]["channels"];
+            assert_eq!(channels, &before["animations"][index]["channels"]);
+        }
     }
     // The left hip turned by 90° about z; now the right one turns the other way.
     let loaded = Format::open_detected(&folder.join("b.gltf"), &ReadOptions::default()).unwrap();

@@ -204,9 +204,21 @@ fn every_box_has_a_panel_and_every_method_a_curve() {
     assert_eq!(marks.curves(BESSEL_OVERHAUSER).len(), 8);
     let marks = plot(folder.path(), &["--box", "2", "-m", "all"]);
     assert!(marks.says("dimension 5: w of box 2") && !marks.says("dimension 1: w of box 1"));
+    // A curve that later ones cover is named with the one above it.
+    let covered = |text: &String, name: &str| text.starts_with(&format!("{name} (below "));
     for method in tumble::METHODS {
-        assert!(marks.says(method.name), "{method}");
+        let is_covered = marks.texts.iter().any(|text| covered(text, method.name));
+        assert!(marks.says(method.name) != is_covered, "{method}");
     }
+    let marks = plot(
+        folder.path(),
+        &["--box", "2", "-m", "catmull-rom,slerp,kochanek-bartels"],
+    );
+    assert!(
+        marks.says("catmull-rom (below kochanek-bartels)") && marks.says("slerp"),
+        "{:?}",
+        marks.texts
+    );
 }
 
 /// Panels of a skeleton are called by its joints; of a long name the end is shown.

@@ -113,7 +113,7 @@ fn the_pictures_of_retargeting_are_those_of_the_commands() {
     let folder = check("docs/retarget.md", 6);
     for name in ["vrm", "mixamo", "smpl"] {
         let picture = format!("docs/retarget/{name}.png");
-        let [made, kept] = [folder.path(), root()].map(|folder| folder.join(&picture));
+        let [made, kept] = [folder.path(), &root()].map(|folder| folder.join(&picture));
         if std::env::var_os("UPDATE_EXPECTED").is_some() {
             fs::copy(&made, &kept).unwrap();
         }
@@ -131,4 +131,28 @@ fn the_pictures_of_retargeting_are_those_of_the_commands() {
             kept.len()
         );
     }
+}
+
+/// The plots of the gallery are those that the commands under them make.
+#[test]
+fn the_plots_of_the_gallery_are_those_of_the_commands() {
+    let page = fs::read_to_string(root().join("docs/gallery.md")).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    copy_data(folder.path());
+    let mut plots = 0;
+    for command in page.lines().filter_map(|line| line.strip_prefix("tumble ")) {
+        let Some(picture) = command.split(" -o ").nth(1).filter(|it| it.ends_with(".svg")) else {
+            continue;
+        };
+        let words: Vec<&str> = command.split_whitespace().collect();
+        program::succeed(folder.path(), &words);
+        let [made, kept] = [folder.path(), &root()].map(|folder| folder.join(picture));
+        if std::env::var_os("UPDATE_EXPECTED").is_some() {
+            fs::copy(&made, &kept).unwrap();
+        }
+        let [made, kept] = [made, kept].map(|path| fs::read_to_string(path).unwrap());
+        assert!(made == kept, "{picture}: UPDATE_EXPECTED=1 writes it");
+        plots += 1;
+    }
+    assert_eq!(plots, 3);
 }

@@ -27,11 +27,13 @@ use crate::run::interruptible;
 /// target; by default it is derived from the positions of hips, head and legs.
 ///
 /// Rotations away from the rest pose are the same in the world. Times are the source's. Joints without a partner keep
-/// their rest rotations, and translations of joints other than the hips are lost. The report is a dict: `pairs`,
-/// `resting`, `dropped`, `furthest_dropped` (the one of these that rotates furthest from its rest, and the degrees,
-/// or None), `aligned` (degrees by joint), `scale`, `axes`, `axes_assumed`, `dropped_translation`,
-/// `largest_difference` (rad, of rounding), `ends` (how far hands and feet come away from the source's, in heights of
-/// the hips), `below_ground`.
+/// their rest rotations, and translations of joints other than the hips are lost. The report is a dict: `pairs`, `resting`,
+/// `dropped`, `furthest_dropped` (the one of these that rotates furthest from its rest, and the degrees, or None),
+/// `aligned` (degrees by joint), `scale`, `axes`, `axes_assumed`, `dropped_translation`, `largest_difference`
+/// (rad, of rounding), `ends` (how far hands and feet come away from the source's, in heights of the hips), `below_ground`,
+/// `stood_along` (the axis along which an SMPL body stands, if it is found and not y: the motion was rotated to y up; or None),
+/// `rests_along` (the axes along which the body stands in its rest pose and in the motion, if they differ: give
+/// `rest_frame`; or None).
 ///
 /// >>> import tumble
 /// >>> keys = [[[0, 0, 0, 1], [0, 0, 1, 0]], [[0, 0, 0, 1], [0, 0, 0, 1]]]
@@ -131,5 +133,8 @@ fn report_of<'py>(py: Python<'py>, report: &RetargetReport) -> PyResult<Bound<'p
     }
     found.set_item("ends", ends)?;
     found.set_item("below_ground", report.below_ground)?;
+    found.set_item("stood_along", report.stood_along.map(|axis| axis.to_array()))?;
+    let axes = report.rests_along.map(|axes| axes.map(|axis| axis.to_array()));
+    found.set_item("rests_along", axes)?;
     Ok(found)
 }

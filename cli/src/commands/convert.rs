@@ -7,7 +7,7 @@ use tumble::{Device, Engine, EulerSequence, SampleTimes};
 use tumble_formats::dialect::write::WrittenDialect;
 use tumble_formats::format::{FormatOption, MotionOptions};
 use tumble_formats::learning::{Mirror, MirrorError, mirrored, without_partner};
-use tumble_formats::motion::Motion;
+use tumble_formats::motion::{Motion, ScalarKind};
 use tumble_formats::printable::printable;
 use tumble_formats::quaternion::ComponentOrder;
 use tumble_formats::sample::ChannelMethods;
@@ -187,6 +187,11 @@ impl Arguments {
         if let Some(warning) = lost_partners(name, &report.alone, &in_place) {
             words::warn_of(of_clip(warning));
         }
+        // Weights of morph targets alone are no joints.
+        let mut scalars = (0..clip.set.scalar_count()).map(|index| clip.scalar(index).kind);
+        if clip.set.track_count() == 0 && scalars.all(|kind| kind == ScalarKind::Plain) {
+            return Ok((Cow::Owned(mirrored), None));
+        }
         let pairs = words::count(report.pairs.len(), "pair");
         let alone = match report.alone.len() {
             0 => "no joint is".to_owned(),
@@ -296,7 +301,8 @@ impl Arguments {
 /// Says that the weights of morph targets stay as they are, if some are those of one side.
 fn note_weights(name: &str, clips: &[&Motion]) {
     for clip in clips {
-        let weights: Vec<&str> = clip.scalar_keys().map(|keys| keys.name).collect();
+        let weights = (0..clip.set.scalar_count()).filter_map(|index| clip.set.scalar(index));
+        let weights: Vec<&str> = weights.map(|keys| keys.name).collect();
         let in_place: Vec<usize> = (0..weights.len()).collect();
         let of_sides = without_partner(&weights, &in_place);
         if let Some(&first) = of_sides.first() {

@@ -145,6 +145,10 @@ pub(super) fn replace_joints(
         if animation.channels.is_empty() {
             writer.add(&mut animation, (clip.index, clip), AtRest::Written, edits)?;
         }
+        // Samplers without keys.
+        if animation.channels.is_empty() {
+            continue;
+        }
         let kept = samplers.len();
         let kept_samplers = samplers.iter();
         let kept_samplers = kept_samplers.filter_map(|&sampler| before.samplers.get(sampler));

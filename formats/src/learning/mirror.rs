@@ -61,7 +61,7 @@ pub fn mirror_pairs<T: AsRef<str>>(names: &[T]) -> Vec<usize> {
     pairs.collect()
 }
 
-/// The names that the partner of a name may have.
+/// The name with the other side, in each of the ways in which names have sides.
 fn renamed(name: &str) -> impl Iterator<Item = String> {
     on_other_side(name).chain(by_initial(name))
 }

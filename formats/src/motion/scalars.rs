@@ -198,7 +198,7 @@ impl Motion {
     }
 
     /// The keys of all scalars.
-    pub(crate) fn scalar_keys(&self) -> impl Iterator<Item = ScalarKeys<'_>> {
+    pub fn scalar_keys(&self) -> impl Iterator<Item = ScalarKeys<'_>> {
         (0..self.set.scalar_count()).filter_map(|index| self.set.scalar(index))
     }
 
