@@ -472,7 +472,7 @@ fn stores_into_buffers_are_marked_in_kernels_for_cards() {
         assert_eq!([buffers[1], others[1]], [marked, 0], "{name}");
         for_cards += usize::from(is_for_cards);
     }
-    assert_eq!(for_cards, 64 + 8);
+    assert_eq!(for_cards, 72 + 8);
 }
 
 #[test]
