@@ -262,7 +262,7 @@ fn calls(engine: &Engine) -> Vec<Call> {
     ]
 }
 
-/// Run by the test above, in a process of its own.
+/// The test above runs this in a separate process.
 #[test]
 #[ignore = "part of tasks_of_a_callers_own_pool_may_call_everything_at_once"]
 fn four_hundred_tasks() {
@@ -349,7 +349,7 @@ fn threads_that_the_system_refuses_are_an_error() {
     runs(command).unwrap();
 }
 
-/// Run by the test above, in a process of its own.
+/// The test above runs this in a separate process.
 #[test]
 #[ignore = "part of threads_that_the_system_refuses_are_an_error"]
 fn refused_threads() {

@@ -799,7 +799,7 @@ fn files_are_written_only_where_the_options_say() {
     assert_eq!(files_after("user")[0], both.into());
 }
 
-/// Run by the test above it, each in a child process.
+/// The test above runs each of these in a child process.
 #[test]
 #[ignore = "run by files_are_written_only_where_the_options_say"]
 #[allow(unsafe_code)] // the device is the application's

@@ -132,7 +132,7 @@ fn every_vector_width_prepares_the_same_curves() {
     }
 }
 
-/// Run by the test above it, in a process of its own.
+/// The test above runs this in a separate process.
 #[test]
 #[ignore = "part of every_vector_width_prepares_the_same_curves"]
 fn prints_hashes() {

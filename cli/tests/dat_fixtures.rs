@@ -6,7 +6,7 @@ use rayon::prelude::{IntoParallelRefIterator, ParallelIterator};
 
 use crate::cases;
 
-/// As a person meets them: by the program, with its exit code.
+/// What a user sees: the program's messages and its exit code.
 #[test]
 fn the_program_says_of_every_fixture_what_is_expected() {
     let temporary = tempfile::tempdir().unwrap();
