@@ -10,7 +10,7 @@ use sha2::{Digest, Sha256};
 use tumble::paths::{Direction, Follow, PathFrame, PathSpeed};
 use tumble::{Device, Engine, Layout, METHODS, SampleTimes, TrackSet, VectorWidth};
 
-/// Steps from a hundredth of a degree to half a turn, evenly and unevenly.
+/// Steps from 0.01° to 180°, at even and uneven times.
 fn rotations() -> TrackSet {
     let mut set = TrackSet::new();
     for track in 0..40 {
