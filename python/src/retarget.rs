@@ -27,11 +27,10 @@ use crate::run::interruptible;
 /// target; by default it is derived from the positions of hips, head and legs.
 ///
 /// Rotations away from the rest pose are the same in the world. Times are the source's. Joints without a partner keep
-/// their rest rotations, and translations of joints other than the hips are lost. The report is a dict: `pairs`,
-/// `resting`, `dropped`, `furthest_dropped` (the one of these that rotates furthest from its rest, and the degrees,
-/// or None), `aligned` (degrees by joint), `scale`, `axes`, `axes_assumed`, `dropped_translation`,
-/// `largest_difference` (rad, of rounding), `ends` (how far hands and feet come away from the source's, in heights of
-/// the hips), `below_ground`.
+/// their rest rotations, and translations of joints other than the hips are lost. The report is a dict: `pairs`, `resting`,
+/// `dropped`, `furthest_dropped` (the one of these that rotates furthest from its rest, and the degrees, or None),
+/// `aligned` (degrees by joint), `scale`, `axes`, `axes_assumed`, `dropped_translation`, `largest_difference`
+/// (rad, of rounding), `ends` (how far hands and feet come away from the source's, in heights of the hips), `below_ground`.
 ///
 /// >>> import tumble
 /// >>> keys = [[[0, 0, 0, 1], [0, 0, 1, 0]], [[0, 0, 0, 1], [0, 0, 0, 1]]]
