@@ -1,5 +1,5 @@
-//! How far the engine is from the textbook, in radians, with stated bounds: slerp
-//! 6e-7 (largest) and 1e-7 (rms), cubic methods 1e-6 and 1e-7, norms 4e-7.
+//! The errors of the engine against textbook formulas, in radians, with stated bounds: slerp 6e-7
+//! (largest) and 1e-7 (rms), cubic methods 1e-6 and 1e-7, norms 4e-7.
 
 use crate::method_lists::{Column, assert_stated};
 use crate::support::{Random, give_key_data, hostile_set, is_due};
@@ -147,8 +147,8 @@ fn every_method_is_within_its_bounds_for_steps_up_to_half_a_turn() {
     }
 }
 
-/// Keys as dense as those of motion capture, whose curves are prepared without being
-/// fitted, and some that are just too far apart for that; evenly timed and not.
+/// Keys as dense as in motion capture, whose curves are prepared without fits, and keys that are
+/// just too far apart for this; at even and uneven times.
 #[test]
 fn every_method_is_within_its_bounds_for_keys_near_each_other() {
     for (seed, step) in [(12, 0.02), (13, 0.1), (14, 0.25)] {
@@ -167,7 +167,7 @@ fn every_method_is_within_its_bounds_for_keys_near_each_other() {
     }
 }
 
-/// Arcs of up to a whole turn, which are made of two.
+/// Arcs of up to 360°, which consist of two.
 #[test]
 fn slerp_is_within_its_bounds_the_long_way_too() {
     let mut random = Random(15);
@@ -222,7 +222,7 @@ fn accuracy_does_not_decay_along_a_day() {
     }
 }
 
-/// One-frame gaps beside long ones, tiny angles, wild tangents: those too.
+/// The bounds also hold for gaps of one frame next to long ones, tiny angles and large tangents.
 #[test]
 fn hostile_keys_are_within_the_bounds() {
     for seed in 0..4 {
@@ -290,8 +290,8 @@ fn bits(q: Quat) -> [u32; 4] {
     q.to_array().map(f32::to_bits)
 }
 
-/// Not nearly: the key's own bits, on frames and at explicit times, at hour 24 too,
-/// whatever the sign it was stored with.
+/// A sample at a key has exactly the key's bits, at frames and at explicit times, also after 24
+/// hours, whatever the stored sign of the key is.
 #[test]
 fn keys_are_reproduced_exactly() {
     for start in [0.0, -3.5, 86_400.0] {

@@ -1,6 +1,5 @@
-//! Every test of the engine: a program for each file would link the library, and compile what
-//! it makes of generic functions, as often as there are files.
-//! `cargo test --test all motion::` runs those of one file.
+//! Every test of the engine. A program for each file would link the library and compile its generic
+//! functions once per file. `cargo test --test all motion::` runs those of one file.
 
 // Tests may use what systems round differently (clippy.toml).
 #![allow(clippy::disallowed_methods)]

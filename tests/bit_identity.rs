@@ -1,5 +1,4 @@
-//! The claim itself: every device gives the CPU's bits, for every method, at any
-//! frames, however the work is cut.
+//! Every device gives the CPU's bits, for every method, at any frames, however the work is divided.
 
 use crate::support::{
     KERNEL_OPTIONS, Random, first_difference, give_key_data, hostile_set, is_due, round_robin,
@@ -207,8 +206,8 @@ fn every_memory_budget_transfer_and_layout_gives_the_same_bits() {
     }
 }
 
-/// Long results are written past the caches on processors that gain by it. Catches what such
-/// stores leave out.
+/// On processors where this is faster, long results are written past the caches. Catches values
+/// that such stores leave out.
 #[test]
 fn long_results_have_the_bits_of_short_ones() {
     let set = hostile_set(7, 1800);
@@ -524,7 +523,7 @@ fn everywhere() -> Vec<Engine> {
     all.collect::<Result<_, _>>().unwrap()
 }
 
-/// All of them give these bits from keys.
+/// Asserts that all engines give these bits from keys.
 fn assert_everywhere(
     engines: &[Engine],
     expected: &Rotations,
@@ -867,8 +866,8 @@ fn long_tracks_in_stretches_have_the_same_bits() {
     assert!(words.contains("keys 8999 and 9000"), "{words}");
 }
 
-/// Frames in a gap of more than 2^32 cannot be counted: every route reports which key it is
-/// behind, also in a piece of a long track, and behind intervals that were cut.
+/// In a gap of more than 2^32 frames, frames cannot be counted. Every route reports the key before
+/// the gap, also in a piece of a long track, and after divided intervals.
 #[test]
 fn a_gap_too_long_is_named_by_its_key() {
     let mut random = Random(85);
@@ -991,8 +990,8 @@ fn crowds_of_two_keys_have_the_same_bits() {
     }
 }
 
-/// A few times of each track are looked up one by one: the same bits as in a run, between
-/// keys, on them and beside them, in tracks of any length.
+/// A few times of each track are searched one by one: the same bits as in a run, between keys, at
+/// keys and next to keys, in tracks of any length.
 #[test]
 fn few_times_of_each_track_have_the_bits_of_many() {
     let mut random = Random(84);

@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 
 use tumble::verify::{Agreement, DifferenceKind, UNWRITTEN, WordBound, WordType, compare_buffers};
 
-/// Each kind of difference, in both types of floats: bits, and their number of steps.
+/// Each kind of difference, in both types of floats: the number of values with other bits, and the
+/// number of steps between them.
 #[test]
 fn every_kind_of_difference_is_told_from_the_others() {
     use DifferenceKind::{

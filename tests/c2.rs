@@ -20,7 +20,7 @@ fn walk(random: &mut Random, steps: impl Fn(&mut Random) -> f64, keys: usize) ->
     all
 }
 
-/// Times whose gaps are up to `ratio` apart: one is 1 and one is `ratio`.
+/// Times whose gaps have the ratio `ratio` at most: the shortest is 1 and the longest `ratio`.
 fn times(random: &mut Random, keys: usize, ratio: f64) -> Vec<f64> {
     let mut gaps: Vec<f64> = (1..keys).map(|_| ratio.powf(random.unit())).collect();
     let ends = [0; 2].map(|_| random.next() as usize % gaps.len());
@@ -34,8 +34,8 @@ fn times(random: &mut Random, keys: usize, ratio: f64) -> Vec<f64> {
     all
 }
 
-/// The angular accelerations just before each inner key and just behind it, and the largest speed in
-/// radians per second, for the size of rounding.
+/// The angular accelerations just before and just after each inner key, and the largest speed in
+/// radians per second, on which rounding depends.
 fn accelerations(set: &TrackSet, interpolation: Interpolation) -> Vec<[DVec3; 2]> {
     let engine = Engine::new(Device::Cpu).unwrap();
     let of = interpolation.with_quantity(Quantity::Acceleration(Axes::Body));
@@ -59,7 +59,7 @@ fn one(times: &[f64], keys: &[Quat]) -> TrackSet {
     set
 }
 
-/// By how much the acceleration jumps, as a part of the largest at any key.
+/// The jump of the acceleration, relative to the largest acceleration at any key.
 fn jump(set: &TrackSet, interpolation: Interpolation) -> f64 {
     let all = accelerations(set, interpolation);
     let largest = all.iter().flatten().map(|v| v.length()).fold(0.0, f64::max);
@@ -217,7 +217,7 @@ fn engine_and_reference_take_one_solution_of_hostile_keys() {
     assert!(counted > 0 && seen > 10_000, "{counted}, {seen}");
 }
 
-/// Steps of nearly a whole turn cost the keys beside them the continuous acceleration, and no others.
+/// After steps of nearly 360°, only the keys next to them lose the continuous acceleration.
 #[test]
 fn long_steps_cost_other_keys_nothing() {
     let mut random = Random(8);

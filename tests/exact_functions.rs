@@ -1,5 +1,5 @@
-//! A shader of somebody who uses the crate `tumble-exact`: its functions, and sums that drivers like to simplify, compiled by
-//! naga and made exact, have the bits of Rust on every device. Without the pass they do not.
+//! A shader of a user of the crate `tumble-exact`: its functions, and sums that drivers tend to simplify, are
+//! compiled by naga and made exact. They have the bits of Rust on every device. Without the pass they do not.
 
 use std::process::Command;
 

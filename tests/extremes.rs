@@ -1,6 +1,6 @@
-//! Nothing that is public panics, whatever it is called with: every call with extreme numbers, lengths
-//! and indices gives a result or an error. The few that may panic say so and have a twin that does
-//! not ([`TrackSet::track`] and [`TrackSet::get`]).
+//! No public function panics, whatever its arguments are: every call with extreme numbers, lengths and
+//! indices gives a result or an error. The few that may panic say so and have a twin that does not
+//! ([`TrackSet::track`] and [`TrackSet::get`]).
 
 use std::ops::Range;
 
@@ -56,7 +56,7 @@ const COUNTS: [usize; 9] = [
     usize::MAX,
 ];
 
-/// Values of all kinds, tame ones more often: else nothing is ever evaluated.
+/// Values of all kinds, ordinary ones more often; otherwise nothing would ever be evaluated.
 struct Generator(Random);
 
 impl Generator {
@@ -352,7 +352,7 @@ fn ask(generate: &mut Generator, set: &TrackSet) {
     let _ = TrackSet::from_shared_times(times, shared).is_ok();
 }
 
-/// Evaluates a set in every way that there is.
+/// Evaluates a set by every function that evaluates.
 fn evaluate(generate: &mut Generator, engine: &Engine, set: &TrackSet) {
     let (interpolation, frames) = (generate.interpolation(), generate.frames());
     let layout = generate.layout();
@@ -458,7 +458,7 @@ fn evaluate(generate: &mut Generator, engine: &Engine, set: &TrackSet) {
     let _ = request.evaluate_into(&mut bytes).is_ok();
 }
 
-/// Whole poses and smoothing.
+/// Calls passes over poses, and smoothing.
 fn combine(generate: &mut Generator, engine: &Engine) {
     let (a, b) = (generate.rotations(), generate.rotations());
     let weights = [generate.number() as f32, generate.number() as f32];
@@ -486,7 +486,7 @@ fn combine(generate: &mut Generator, engine: &Engine) {
     }
 }
 
-/// Calls functions that take numbers alone.
+/// Calls functions whose arguments are only numbers.
 fn small_things(generate: &mut Generator) {
     let layout = generate.layout();
     let _ = layout.index(

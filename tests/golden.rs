@@ -22,7 +22,8 @@ fn every_width() -> Vec<Engine> {
     VectorWidth::available().into_iter().map(at).collect()
 }
 
-/// Writes what the CPU makes of the cases into the table; with `new`, of those that it has not.
+/// Writes the CPU's hashes of all cases into the table; with `new`, only of cases that are not in
+/// it.
 fn record(golden: &Golden, update: &str) {
     let engine = Engine::new(Device::Cpu).unwrap();
     let mut table = String::new();

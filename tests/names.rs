@@ -60,7 +60,7 @@ fn values_of_options_are_found_by_their_names() {
     }
 }
 
-/// A text that is no value is named by the message, whatever type it was parsed as.
+/// The message has the text that is not a value, whatever type it was parsed as.
 #[test]
 fn messages_say_what_was_parsed() {
     fn message<T: FromStr<Err: Display>>(text: &str) -> String {

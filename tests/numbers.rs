@@ -507,7 +507,7 @@ fn a_crowd_fails_as_an_engine_does() {
     assert_eq!(error, CrowdError::Instances { requested: 0 });
 }
 
-/// A mix at its ends is its inputs, bit for bit, and so is a layer of a crowd at weight 1.
+/// At weights 0 and 1 a mix has the bits of its inputs, and so has a layer of a crowd at weight 1.
 #[test]
 fn ends_of_a_mix_are_the_inputs() {
     let bits = |quats: &[Quat]| -> Vec<[u32; 4]> {

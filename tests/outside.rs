@@ -1,4 +1,4 @@
-//! Before the first key and behind the last: held, again, back and forth, or on.
+//! Before the first key and after the last one: held, repeated, mirrored, or extrapolated.
 
 use crate::support::{Random, first_difference, give_key_data, round_robin, vulkan_engines};
 use glam::{DQuat, DVec3, Quat};
@@ -114,7 +114,7 @@ fn outside_is_what_the_words_say() {
     }
 }
 
-/// Where rounding decides on which side of a jump a time lies.
+/// Whether rounding decides on which side of a jump a time is.
 fn near_a_seam(track: Track, time: f64) -> bool {
     let (first, last) = (track.times[0], track.times[track.times.len() - 1]);
     let length = (last - first).max(1e-300);

@@ -22,7 +22,7 @@ fn engines() -> Vec<Engine> {
     std::iter::once(little).chain(engines).collect()
 }
 
-/// Five interpolations in turn, so that the tracks of each lie between others.
+/// Five interpolations in turn, so that the tracks of each are between those of others.
 fn alternating(tracks: usize) -> Vec<Interpolation> {
     let looped = Interpolation::from(method::SQUAD)
         .with_before(WrapMode::Loop)

@@ -1,5 +1,5 @@
-//! Poses from poses: layers blended, mixed and added, and chains walked down to the
-//! world. The same bits on every device, near the textbook.
+//! Poses from poses: layers that are blended, mixed and added, and local poses that are converted
+//! to the world. They have the same bits on every device, and are near the textbook formulas.
 
 #[cfg(feature = "vulkan")]
 mod buffers;

@@ -1,5 +1,5 @@
-//! Keys that are taken out: the curve of those that stay is near every sample, as the engine evaluates
-//! it.
+//! Keys are removed: the curve through the remaining ones, as the engine evaluates it, is near every
+//! sample.
 
 use glam::{DQuat, DVec3, Quat, Vec3};
 use proptest::prelude::*;
@@ -190,7 +190,7 @@ fn what_needs_few_keys_gets_few() {
     assert_eq!(found.indices, plain.indices);
 }
 
-/// A curve through 26 keys, sampled densely, needs about so many keys of the same curve again.
+/// A curve through 26 keys that is sampled densely is reduced to about as many keys.
 #[test]
 fn samples_of_a_curve_need_few_of_its_keys() {
     let mut random = Random(3);

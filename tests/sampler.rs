@@ -13,7 +13,7 @@ fn cpu() -> Engine {
     Engine::new(Device::Cpu).unwrap()
 }
 
-/// Times that jump, on keys and beside them, then stand, run forwards and run backwards.
+/// Times that jump, at keys and next to them, then stay the same, run forwards and run backwards.
 fn times(set: &TrackSet, random: &mut Random) -> Vec<f64> {
     let mut times: Vec<f64> = (0..60).map(|_| random.between(-30.0, 70.0)).collect();
     for &key in set.tracks().flat_map(|track| track.times).step_by(7) {
@@ -82,7 +82,7 @@ fn samples_have_the_bits_of_evaluate() {
     assert_sampled(&clip, &times, "constant speed");
 }
 
-/// Clips keep packed segments; sets are evaluated from whole ones, or from keys.
+/// Clips keep packed segments; sets are evaluated from unpacked ones, or from keys.
 #[test]
 fn packed_segments_have_the_bits_of_whole_ones() {
     let set = motion_set(31);

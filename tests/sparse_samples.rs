@@ -58,8 +58,8 @@ fn values(
     found.iter().map(|value| value.map(f32::to_bits)).collect()
 }
 
-/// Would find an interval that is prepared from the wrong keys, a sample that is written where another
-/// belongs, and one that no part gives.
+/// Catches an interval that is prepared from the wrong keys, a sample at the place of another, and a
+/// sample that no part computes.
 #[test]
 fn few_samples_have_the_bits_of_many() {
     let mut random = Random(91);
@@ -249,7 +249,7 @@ fn few_vectors_and_encodings_have_the_bits_of_many() {
     assert_eq!(of(&sparse), of(&dense));
 }
 
-/// Work is stopped in whatever it is about: before, and while other threads do it.
+/// Work can be stopped before it begins and at any stage, also if other threads do it.
 #[test]
 fn stopped_work_ends() {
     let set = long_set(3, 4, 40_000);

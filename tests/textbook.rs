@@ -15,7 +15,7 @@ use tumble::{
     method::{self, Continuity, Keys},
 };
 
-/// Every method but those that are made to jump.
+/// Every method except those whose curves jump.
 fn moving() -> impl Iterator<Item = Method> {
     METHODS.into_iter().filter(|&method| method != method::STEP)
 }
@@ -68,7 +68,8 @@ fn unit_quaternion() -> impl Strategy<Value = DQuat> {
 }
 
 proptest! {
-    /// Four algebraic forms and the geometric one: a wrong order of factors shows.
+    /// Four algebraic forms and the geometric one: they would differ if the order of factors were
+    /// wrong.
     #[test]
     fn the_five_forms_of_slerp_agree(a in unit_quaternion(), b in unit_quaternion(), t in 0.0..=1.0f64) {
         let b = if a.dot(b) < 0.0 { -b } else { b };
@@ -178,7 +179,7 @@ fn acceleration_jumps(curve: &ReferenceCurve, segments: usize) -> f64 {
         .fold(0.0, f64::max)
 }
 
-/// Also that a method is not smoother than it says: then it says too little.
+/// Also checks that a method is not smoother than stated.
 #[test]
 fn continuity_is_what_is_promised() {
     let mut random = Random(3);
@@ -363,7 +364,7 @@ fn natural_ends_have_no_angular_acceleration() {
     }
 }
 
-/// Methods that ask what to do at the ends.
+/// Methods that have boundary conditions.
 fn with_ends() -> impl Iterator<Item = Method> {
     METHODS.into_iter().filter(|method| method.uses_neighbours)
 }

@@ -29,7 +29,7 @@ fn child(test: &str) -> Command {
     command
 }
 
-/// Many times the time that a loaded machine needs for work of seconds.
+/// Many times as long as a busy machine needs for this work.
 const LIMIT: Duration = Duration::from_secs(300);
 
 /// Waits for a process, and ends it after a while.
@@ -72,7 +72,7 @@ fn sum<T: bytemuck::NoUninit>(values: &[T]) -> u64 {
     hasher.finish()
 }
 
-/// More rotations than one task of the CPU has, so that every call shares its work.
+/// More rotations than one task of the CPU has, so that every call divides its work.
 fn keys() -> TrackSet {
     let mut random = Random(3);
     let times: Vec<f64> = (0..26).map(|i| f64::from(i) * 0.4).collect();
@@ -262,7 +262,7 @@ fn calls(engine: &Engine) -> Vec<Call> {
     ]
 }
 
-/// Run by the test above, in a process of its own.
+/// The test above runs this in a separate process.
 #[test]
 #[ignore = "part of tasks_of_a_callers_own_pool_may_call_everything_at_once"]
 fn four_hundred_tasks() {
@@ -349,7 +349,7 @@ fn threads_that_the_system_refuses_are_an_error() {
     runs(command).unwrap();
 }
 
-/// Run by the test above, in a process of its own.
+/// The test above runs this in a separate process.
 #[test]
 #[ignore = "part of threads_that_the_system_refuses_are_an_error"]
 fn refused_threads() {

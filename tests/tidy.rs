@@ -1,4 +1,4 @@
-//! Rules of the house that a compiler does not know.
+//! Rules of this project that the compiler does not check.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -335,8 +335,8 @@ fn refused(layer_name: &str, line: &str) -> Option<String> {
     })
 }
 
-/// A folder that can be read without what is built on it, and no circle. Unit tests may look
-/// up: they drive what they test through the engine.
+/// Each folder can be read without the folders that are built on it, and there is no circle. Unit
+/// tests may look up: they drive what they test through the engine.
 #[test]
 fn imports_go_down_the_layers() {
     let mut checked = 0;
@@ -388,7 +388,7 @@ fn an_import_upwards_is_refused() {
     assert!(refused("tracks", "/// See [`Engine`](crate::engine::Engine).").is_none());
 }
 
-/// A visitor reads one page; all else is in `docs/`.
+/// The README is one page; everything else is in `docs/`.
 #[test]
 fn the_readme_is_one_page() {
     let lines = read("README.md").lines().count();

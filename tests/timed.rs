@@ -1,4 +1,5 @@
-//! Clips that are recorded into an application's commands at times that are known only then.
+//! Clips that are recorded into an application's commands, at times that are known only when they
+//! are recorded.
 #![allow(unsafe_code)] // the device, the buffers and the commands are the application's
 
 use tumble::vulkan::tuning::Mapping;
@@ -11,7 +12,7 @@ use tumble::{
 use crate::application::{Application, ApplicationBuffer, Commands};
 use crate::support::{Random, hostile_set, vulkan_devices};
 
-/// Bytes that nothing may write.
+/// Bytes around a result, which nothing may write.
 const UNTOUCHED: u8 = 0xa5;
 
 /// Two poses at other times in each of some frames, in one command buffer: the bits of the CPU at these times, also of

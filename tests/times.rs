@@ -1,4 +1,5 @@
-//! At any time: no sample is left unwritten, and accuracy does not hang on when a motion is.
+//! At any time: every sample is written, and the accuracy does not depend on when a motion takes
+//! place.
 
 use glam::{DQuat, DVec3, Quat, Vec3};
 use proptest::prelude::*;
@@ -236,7 +237,8 @@ fn accuracy_is_the_same_at_every_time() {
     }
 }
 
-/// Curves that turn far within an interval are cut at times that an f64 has, and fitted between these.
+/// Curves that rotate far within an interval are divided at times that f64 can represent, and fitted
+/// between these.
 #[test]
 fn curves_of_raw_unix_times_are_as_accurate_as_at_zero() {
     let engine = Engine::new(Device::Cpu).unwrap();
@@ -279,7 +281,7 @@ fn curves_of_raw_unix_times_are_as_accurate_as_at_zero() {
     }
 }
 
-/// A motion that is repeated for 1e12 s is where exact arithmetic has it.
+/// A motion that is repeated for 1e12 s agrees with exact arithmetic.
 #[test]
 fn repeated_motion_is_as_accurate_far_out() {
     let engine = Engine::new(Device::Cpu).unwrap();
@@ -364,7 +366,7 @@ fn frames_at_keys_of_unix_time_show_the_keys() {
     }
 }
 
-/// The velocity at the end of a track goes on for as long as f64 can tell.
+/// The velocity at the end of a track continues as long as f64 distinguishes the times.
 #[test]
 fn far_extrapolation_is_finite() {
     let mut set = TrackSet::new();

@@ -36,7 +36,8 @@ fn no_layer_has_anything_to_say_of_the_library() {
     }
 }
 
-/// A race needs two invocations. An older layer reports some of one, and nothing else of it is left out.
+/// A race needs two invocations. An older layer reports races of a single one; only these messages are
+/// ignored.
 #[test]
 fn only_a_race_of_an_invocation_with_itself_is_left_out_of_an_older_layer() {
     let race = |one, other| {

@@ -27,7 +27,7 @@ fn the_cpu_is_within_its_bounds_and_says_that_no_device_took_part() {
     }
 }
 
-/// A range without a sample, and a set without a track: a comparison of nothing is no pass.
+/// A range without a sample, or a set without a track, is not a pass: nothing was compared.
 #[test]
 fn what_compared_nothing_has_not_passed() {
     let engine = Engine::new(Device::Cpu).unwrap();
@@ -143,7 +143,7 @@ fn rates_between_uneven_keys_are_within_their_bounds() {
     }
 }
 
-/// Where every sample is a key, rates may be 0 at all samples, and large between them.
+/// If every sample is at a key, velocities may be 0 at all samples and large between them.
 #[test]
 fn samples_on_keys_are_within_their_bounds() {
     let engine = Engine::new(Device::Cpu).unwrap();
@@ -186,7 +186,7 @@ fn a_long_track_is_within_its_bounds_in_all_its_parts() {
     }
 }
 
-/// Wherever the tests run: a small job goes to the CPU, a large one never to a device that is one.
+/// On every machine, a small job is done by the CPU, and a large one never by a software device.
 #[test]
 fn nothing_slower_than_the_cpu_is_chosen() {
     let small = Engine::auto_for(2000).unwrap();

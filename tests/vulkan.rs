@@ -1,4 +1,4 @@
-//! Vulkan's side of the bargain: devices, self-tests, validation, handles.
+//! Vulkan devices, self-tests, validation, and handles.
 
 use crate::support::{
     KERNEL_OPTIONS, dense_set, first_difference, hostile_set, is_due, stage, vulkan_devices,
@@ -221,7 +221,7 @@ fn every_way_of_copying_gives_the_same_bits() {
     }
 }
 
-/// A renderer passes its own instance, device and queue.
+/// A renderer passes its instance, device and queue to the engine.
 #[test]
 fn an_applications_own_device_gives_the_same_bits() {
     if vulkan_devices().is_empty() {
@@ -243,7 +243,7 @@ fn an_applications_own_device_gives_the_same_bits() {
     }
 }
 
-/// Results that a renderer draws from: nothing comes back to the host.
+/// Results in a renderer's buffer are not copied to the host.
 #[test]
 fn results_stay_in_an_applications_own_buffer() {
     if vulkan_devices().is_empty() {
@@ -449,7 +449,7 @@ fn the_callers_keys_are_read_where_they_are() {
     }
 }
 
-/// No result is this, so that samples that were not written are found.
+/// No result has this value, so samples that were not written are found.
 const SENTINEL: Quat = Quat::from_xyzw(7.0, 7.0, 7.0, 7.0);
 
 /// That `work` writes what is expected, and nothing `beside` it on either side.
@@ -799,7 +799,7 @@ fn files_are_written_only_where_the_options_say() {
     assert_eq!(files_after("user")[0], both.into());
 }
 
-/// Run by the test above it, each in a child process.
+/// The test above runs each of these in a child process.
 #[test]
 #[ignore = "run by files_are_written_only_where_the_options_say"]
 #[allow(unsafe_code)] // the device is the application's

@@ -10,7 +10,7 @@ use sha2::{Digest, Sha256};
 use tumble::paths::{Direction, Follow, PathFrame, PathSpeed};
 use tumble::{Device, Engine, Layout, METHODS, SampleTimes, TrackSet, VectorWidth};
 
-/// Steps from a hundredth of a degree to half a turn, evenly and unevenly.
+/// Steps from 0.01° to 180°, at even and uneven times.
 fn rotations() -> TrackSet {
     let mut set = TrackSet::new();
     for track in 0..40 {
@@ -132,7 +132,7 @@ fn every_vector_width_prepares_the_same_curves() {
     }
 }
 
-/// Run by the test above it, in a process of its own.
+/// The test above runs this in a separate process.
 #[test]
 #[ignore = "part of every_vector_width_prepares_the_same_curves"]
 fn prints_hashes() {

@@ -9,7 +9,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::Path;
 
-/// The circles that are still there, one a line: files of a package's folder. The table can only shrink.
+/// The circles that still exist, one per line: files of a package's folder. The table may only become
+/// shorter.
 const KNOWN: &[(&str, &str)] = &[
     ("src", ""),
     ("formats/src", ""),

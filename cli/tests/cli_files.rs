@@ -237,7 +237,7 @@ fn pipes_standard_input_and_files_that_change() {
     assert!(run.words.contains("error[E003]"), "{}", run.words);
 }
 
-/// Inputs that no file in a clone can stand for.
+/// Inputs that cannot be files of the repository, such as very long ones.
 #[cfg(unix)]
 #[test]
 fn what_is_no_readable_file_is_refused_with_the_systems_reason() {

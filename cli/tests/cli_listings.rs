@@ -109,7 +109,7 @@ fn devices_and_info_speak_json() {
     assert!((degrees - 0.9f64.to_degrees()).abs() < 1e-3, "{degrees}");
 }
 
-/// A robot whose order of bodies depth first is not that breadth first.
+/// A robot whose depth-first order of bodies differs from the breadth-first order.
 pub(crate) const ARM: &str = r#"<mujoco model="arm"><worldbody><body name="base">
   <body name="lower"><joint name="swing" axis="0 0 2" range="-90 90"/>
     <body name="hand"><joint name="reach" type="slide" range="0 0.5"/></body></body>

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 const LAVAPIPE: &str = "/usr/share/vulkan/icd.d/lvp_icd.x86_64.json";
 const SWIFTSHADER: &str = "/usr/lib/chromium/vk_swiftshader_icd.json";
 
-/// Whether a driver is there; on CI it must be.
+/// Whether a driver is installed; on CI it must be.
 fn is_there(driver: &str) -> bool {
     let there = Path::new(driver).exists() && !vulkan_devices().is_empty();
     assert!(

@@ -6,7 +6,7 @@ use rayon::prelude::{IntoParallelRefIterator, ParallelIterator};
 
 use crate::cases;
 
-/// As a person meets them: by the program, with its exit code.
+/// The messages and the exit code of the program, as a user sees them.
 #[test]
 fn the_program_says_of_every_fixture_what_is_expected() {
     let temporary = tempfile::tempdir().unwrap();

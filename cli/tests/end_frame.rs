@@ -7,7 +7,7 @@ use serde_json::Value;
 
 use crate::program::{root, run, sample_folder, succeed};
 
-/// Three keys on frames of 24 a second, of which the last, at 1.125 s, is that of frame 33.75 of 30 a second.
+/// Three keys on frames of 24 fps; the last one, at 1.125 s, is at frame 33.75 of 30 fps.
 const LOOP: &str = "0 0 0 0 0 0 0 1\n0.5 1 0 0 0 0 0.6 0.8\n1.125 0 0 0 0 0 0 1\n";
 
 fn line(folder: &Path, line: &str) -> String {
@@ -173,8 +173,8 @@ fn an_end_that_a_format_cannot_store_is_refused() {
     }
 }
 
-/// An archive that tells times by a rate holds its end for a frame; one with times has it at its time, and still
-/// says the rate of its frames.
+/// An archive with a rate holds the end for a frame. An archive with times has the end at its time, and still
+/// states the rate of its frames.
 #[test]
 fn archives_keep_their_ends() {
     let folder = sample_folder();
@@ -189,7 +189,7 @@ fn archives_keep_their_ends() {
     assert_eq!(back, (35, 0.0, 1.125));
 }
 
-/// A file that is written again ends as new files do, and as it is asked to.
+/// A rewritten file ends like a new one, and as `--end-frame` says.
 #[test]
 fn files_that_are_kept_end_as_they_are_asked_to() {
     let folder = sample_folder();

@@ -193,7 +193,7 @@ fn write_inputs(folder: &Path) {
     );
 }
 
-/// Runs lines of a shell, which finds programs in `folder/bin`, where it begins.
+/// Runs lines of a shell script in `folder`, with the programs of `folder/bin`.
 fn shell(folder: &Path, line: &str) -> Run {
     let path = format!(
         "{}/bin:{}",

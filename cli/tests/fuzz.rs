@@ -69,7 +69,7 @@ fn fuzz_for(share: f64, name: &str, target: Target<'_>, mut corpus: Vec<Vec<u8>>
     );
 }
 
-/// A panic keeps its input.
+/// If the target panics, its input is kept.
 fn run(name: &str, target: Target<'_>, input: &[u8]) -> u64 {
     catch_unwind(|| target(input)).unwrap_or_else(|_| {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../target/fuzz");
@@ -357,7 +357,8 @@ fn surfaces() {
     fuzz_files("surfaces", &targets::surfaces::surfaces, seeds, &words);
 }
 
-/// Robots, each kind with its elements: nothing that a file says about bodies breaks the tree.
+/// Files of robots, of each kind and with its elements: whatever a file states about bodies, the
+/// tree stays valid.
 #[test]
 fn robots() {
     let mjcf = r#"<mujoco model="m"><compiler angle="radian" eulerseq="zyx"/><default><joint axis="0 1 0"/>

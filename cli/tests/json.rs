@@ -150,7 +150,7 @@ fn records_have_the_assumed_rate_and_the_end_that_is_left_out() {
     assert_eq!(std::fs::read_to_string(&path).unwrap(), manifest);
 }
 
-/// Inputs that fail are records too: a reader of the JSON alone learns of all.
+/// Failed inputs have records too, so that the JSON alone tells about every input.
 #[test]
 fn lists_have_the_inputs_that_failed() {
     let temporary = sample_folder();

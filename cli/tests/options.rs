@@ -14,8 +14,8 @@ const USAGE: u8 = 2;
 /// The exit code of inputs that are not in the format requested.
 const INPUT: u8 = 4;
 
-/// The words of each option, with those that it needs to have an effect. The values
-/// are such that they change the result.
+/// Each option with the options that it needs to have an effect. The values are chosen so that they
+/// change the result.
 const OPTIONS: &[&[&str]] = &[
     &["--method", "c2"],
     &["--method", "kochanek-bartels"],
@@ -85,7 +85,8 @@ const SILENT: &[&[&str]] = &[
     &["--files-from", "list.txt"],
 ];
 
-/// The bytes of a result by its command line; nothing where it was refused as a usage fault.
+/// The bytes of each result by its command line; `None` if the command line was refused as a usage
+/// error.
 struct Results {
     folder: PathBuf,
     known: HashMap<Vec<&'static str>, Option<Vec<u8>>>,
@@ -304,7 +305,8 @@ fn every_option_is_obeyed_somewhere() {
     }
 }
 
-/// Whether an option, beside another, asks for the default: then it is obeyed, and nothing changes.
+/// Whether an option, together with another, asks for the default: then it is obeyed, and nothing
+/// changes.
 fn is_redundant(input: &str, option: &[&str], other: &[&str]) -> bool {
     let has = |word: &str| other.contains(&word);
     let are_frames = has("csv") || has("world") || has("transform");

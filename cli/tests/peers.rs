@@ -33,7 +33,7 @@ fn scipy_and_splines_agree() {
     peer("check.py", &[]);
 }
 
-/// On hundreds of sets with unevenly spaced keys; `SOAK` tries 2 000.
+/// Compared for hundreds of sets with unevenly spaced keys; with `SOAK`, for 2 000.
 #[test]
 fn c2_is_scipy_s_spline_wherever_that_is_continuous() {
     let sets = match std::env::var_os("SOAK") {

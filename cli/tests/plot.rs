@@ -221,7 +221,7 @@ fn every_box_has_a_panel_and_every_method_a_curve() {
     );
 }
 
-/// Panels of a skeleton are called by its joints; of a long name the end is shown.
+/// The panels of a skeleton have the names of its joints; of a long name, the end is shown.
 #[test]
 fn panels_have_the_names_of_joints() {
     let folder = tempfile::tempdir().unwrap();

@@ -14,7 +14,7 @@ use crate::support::vulkan_devices;
 pub(crate) const LAVAPIPE: &str = "/usr/share/vulkan/icd.d/lvp_icd.x86_64.json";
 const SWIFTSHADER: &str = "/usr/lib/chromium/vk_swiftshader_icd.json";
 
-/// Whether a driver is there; on CI it must be.
+/// Whether a driver is installed; on CI it must be.
 pub(crate) fn is_there(driver: &str) -> bool {
     let there = Path::new(driver).exists() && !vulkan_devices().is_empty();
     assert!(
@@ -149,7 +149,8 @@ fn a_driver_that_is_not_exact_is_told_with_code_6() {
     assert_eq!(faults(&schema("proof"), &proof), Vec::<String>::new());
 }
 
-/// The CPU beside itself, time that is too short for all that must run, and no driver at all.
+/// Not proved: the CPU compared with itself, a time limit that is too short for the necessary
+/// parts, and no driver at all.
 #[test]
 fn what_proves_nothing_is_refused() {
     let temporary = tempfile::tempdir().unwrap();

@@ -18,7 +18,7 @@ const ORANGE: [u8; 3] = [0xe6, 0x9f, 0x00];
 const GREEN: [u8; 3] = [0x00, 0x9e, 0x73];
 
 impl Image {
-    /// Where pixels of a box's hue are: left, top, right, bottom.
+    /// The extent of the pixels with the hue of a box: left, top, right, bottom.
     fn extent(&self, hue: [u8; 3]) -> Option<[usize; 4]> {
         // Light makes a hue brighter or darker; its channels keep their proportions.
         let like = |pixel: &[u8; 3]| {
@@ -322,7 +322,8 @@ fn what_cannot_be_rendered_is_refused_and_nothing_is_written() {
     assert_eq!(fs::read_dir(folder.path().join("used")).unwrap().count(), 1);
 }
 
-/// Two legs beside each other, from hips that are 2 apart, each with its end: bones by parents, no chain.
+/// Two legs, from hips that are 2 apart, each with its end: bones follow the parents and do not form a
+/// chain.
 #[test]
 fn bones_are_where_joints_are() {
     let folder = sample_folder();
@@ -407,7 +408,7 @@ fn a_mesh_is_drawn_where_the_file_has_one() {
     assert!(shown(&["--scale", "0.01"]).extent(GREEN).is_some());
 }
 
-/// A body without places is drawn as a typical one, which is said.
+/// A body without offsets is drawn as a typical one, and a message says so.
 #[test]
 fn a_body_without_places_is_a_typical_one() {
     let body = crate::program::root().join("../shared/data/npz/smplh_like.npz");

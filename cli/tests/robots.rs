@@ -150,8 +150,8 @@ fn every_dialect_is_read_back() {
     }
 }
 
-/// Breadth first, a level of the tree comes before the next, and joints follow their bodies. The file says nothing of it;
-/// its bodies do.
+/// In breadth-first order, each level of the tree comes before the next one, and joints are in the order of their
+/// bodies. The file does not state the order; it follows from the poses of its bodies.
 #[test]
 fn orders_are_stated_and_checked() {
     let folder = folder();
@@ -545,7 +545,7 @@ fn commands_of_the_guides_run() {
     assert!(count >= 15, "{count}");
 }
 
-/// The joints alone, as numbers: an array (frames, joints), and columns with their names.
+/// Only the joints, as numbers: an array (frames, joints), and columns with their names.
 #[test]
 fn scalars_are_evaluated_alone() {
     let folder = folder();

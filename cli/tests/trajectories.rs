@@ -253,7 +253,7 @@ fn times_in_gaps_are_left_out_held_or_refused() {
     assert!(!at.join("no.tum").exists() && !at.join("no.npy").exists());
 }
 
-/// Gaps are gaps however the times are chosen.
+/// Gaps are found however the sample times are chosen.
 #[test]
 fn frames_and_listed_times_lie_in_gaps_too() {
     let folder = sample_folder();
@@ -381,7 +381,8 @@ fn times_since_1970_are_kept_by_every_table() {
     }
 }
 
-/// A time is asked for as the file has it, or counted from the second that its times are counted from.
+/// A time may be requested as it is in the file, or counted from the second from which the clip's times
+/// are counted.
 #[test]
 fn times_of_the_file_may_be_asked_for() {
     let folder = sample_folder();

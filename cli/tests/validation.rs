@@ -100,7 +100,7 @@ fn on_vulkan<'a>(line: &[&'a str]) -> Vec<&'a str> {
     }
 }
 
-/// Run by the test above it, in a process of its own.
+/// The test above runs this in a separate process.
 #[test]
 #[ignore = "plants a fault; run by each_kind_of_check_finds_its_planted_fault"]
 fn planted_fault() {

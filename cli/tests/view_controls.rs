@@ -202,7 +202,7 @@ fn a_click_on_a_box_shows_its_curves() {
     page.wait("tumble.state.box === 1 && document.querySelector('#box').value === '2'");
 }
 
-/// Without looping it stops at the end; with it, it begins again.
+/// Without looping, the animation stops at its end; with looping, it begins again.
 #[test]
 fn it_loops_or_stops_at_the_end() {
     let folder = sample_folder();

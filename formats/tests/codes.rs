@@ -1,5 +1,5 @@
-//! The codes of messages: each is shown by a fixture or a test, and `docs/codes.md` has them all. These take the files
-//! of all formats.
+//! The codes of messages: each is shown by a fixture or a test, and `docs/codes.md` has them all. These tests read
+//! the files of all formats.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -9,7 +9,8 @@ use tumble_formats::{Code, FORMATS, Format};
 use crate::cases;
 use crate::fixtures::verdict;
 
-/// The files of all formats. Those that end in a format's name or extension all have a case.
+/// The files of all formats. Every file whose name ends in the name or extension of a format has a
+/// case.
 fn fixtures() -> Vec<PathBuf> {
     let mut files = Vec::new();
     for &format in FORMATS {

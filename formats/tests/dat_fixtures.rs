@@ -120,7 +120,7 @@ proptest! {
         let _ = read_dat("t", &*bytes, &ReadOptions::default());
     }
 
-    /// Nearly right files reach deeper than arbitrary bytes.
+    /// Nearly valid files get further in the reader than arbitrary bytes.
     #[test]
     fn damaged_files_never_panic(offset in 0usize..60, byte in any::<u8>(), cut in 0usize..70) {
         let mut bytes = b"# 2 3.0\n0.5 1 0 0 0 0.6 0.8 0 0\n1.25 0 1 0 0 0 0 1e0 -0.0\n".to_vec();

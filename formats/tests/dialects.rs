@@ -437,7 +437,7 @@ fn files_of_joints_hold_the_stored_numbers() {
     assert_eq!(at_rate("transposed.pt", 30).clips[0].set.track_count(), 22);
 }
 
-/// No file of the layouts is left out of these tests.
+/// These tests read every file of the layouts.
 #[test]
 fn every_file_of_the_layouts_is_read() {
     let Some(folder) = layouts() else { return };

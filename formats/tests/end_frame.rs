@@ -19,7 +19,7 @@ fn rate(per_second: u64) -> FrameRate {
     FrameRate::new(per_second, 1).unwrap()
 }
 
-/// A body that sways and comes back to where it was, in full swing.
+/// A body that swings and returns to its first pose with its full speed.
 fn looping() -> Motion {
     let times: Vec<f64> = (0..=FRAMES).map(|frame| rate(24).time_of(frame)).collect();
     let phase = |frame: u64| TAU * (frame % FRAMES) as f64 / FRAMES as f64;

@@ -26,7 +26,7 @@ fn fixture(name: &str) -> PathBuf {
     folder.join(name).with_extension("fbx")
 }
 
-/// Whole frames of a rate that is none of the file's, and the ends of the clip.
+/// Whole frames of a rate that is not the file's, and the ends of the clip.
 fn times(clip: &Motion) -> Vec<f64> {
     let (first, last) = clip.set.time_span().unwrap();
     let frames = ((last - first) * 97.0).floor() as u64;
@@ -339,7 +339,7 @@ fn the_value_of_the_next_key_holds_after_a_key() {
     }
 }
 
-/// The keys of the file alone, but for turns that arcs between them would not take.
+/// Only the keys of the file, except for rotations that the arcs between them would not follow.
 #[test]
 fn keyframes_are_those_of_the_file() {
     let options = ReadOptions {
@@ -357,7 +357,8 @@ fn keyframes_are_those_of_the_file() {
     assert!(followed.clips[0].set.track(1).times.len() > 3);
 }
 
-/// Twelve turns between two keys, at whose ends, thirds and quarters nothing is turned.
+/// Twelve full rotations between two keys: the rotation is the identity at their ends, thirds and
+/// quarters.
 #[test]
 fn whole_turns_between_two_keys_are_kept() {
     for keyframes in [false, true] {

@@ -46,7 +46,7 @@ impl Glb {
         glb
     }
 
-    /// Without `asset`, where a fixture has numbers that are not read.
+    /// Without `asset`, because a fixture has numbers there that are not read.
     pub(crate) fn json(&self) -> Value {
         let read = members(&self.text)
             .into_iter()

@@ -173,7 +173,7 @@ fn text_is_written_beside_its_files_alone() {
     assert_eq!(refused(as_text.unwrap_err()).code, Code::GltfFolder);
 }
 
-/// A GLB may name files as well: away from them it says so.
+/// A GLB may refer to files as well; if it is written into another folder, a message says so.
 #[test]
 fn a_glb_away_from_its_files_has_a_warning() {
     let folder = tempfile::tempdir().unwrap();

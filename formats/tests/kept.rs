@@ -95,7 +95,7 @@ fn assert_same(text: &str) {
     );
 }
 
-/// Through glTF and NPZ too, which have no channels for them.
+/// The same through glTF and NPZ, which have no such channels.
 #[test]
 fn bvh_comes_back_word_for_word() {
     let clip = bvh();
@@ -349,7 +349,8 @@ fn a_part_of_a_file_is_the_file_with_shorter_animations() {
     assert_eq!(serde_json::from_slice::<Value>(&text).unwrap(), file);
 }
 
-/// Catches channels of unknown properties that are cut as transforms are, and an animation that stays long without a word.
+/// Catches channels of unknown properties that are cut like transforms, and an animation that stays long without a
+/// warning.
 #[test]
 fn channels_that_are_not_read_are_not_cut_and_that_is_said() {
     let mut file = gltf(&[]);

@@ -84,7 +84,7 @@ fn topics_and_pairs_of_frames_are_tracks() {
     assert_eq!(plain.clips[0].rate, FrameRate::new(100, 1).ok());
 }
 
-/// The others are whole.
+/// The other clips are complete.
 #[test]
 fn a_topic_that_is_broken_is_refused_alone() {
     let loaded = read("twice.mcap");

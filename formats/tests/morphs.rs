@@ -17,7 +17,8 @@ use tumble_formats::{Code, Format, Loaded, ReadOptions};
 use crate::gltf::{open, sample};
 use crate::support::shared_data;
 
-/// The samplers of the file: how, times, and the values of two, two and one morph targets.
+/// The samplers of the file: interpolation, times, and the values of two, two and one morph
+/// targets.
 type Channel = (&'static str, &'static [f32], &'static [f32]);
 
 const LINEAR: Channel = (

@@ -1,4 +1,4 @@
-//! Positions far from 0 keep their digits through every format that has room for them.
+//! Positions far from 0 keep their digits through every format that can store them.
 
 use glam::{DQuat, DVec3, Quat};
 use tumble::{Channel, Device, Engine, SampleTimes, TrackSet};
@@ -36,7 +36,7 @@ fn utm(step: f64) -> (Motion, Vec<DVec3>) {
     (clip, points)
 }
 
-/// Where the one track of a clip is at its keys.
+/// The positions of a clip's only track at its keys.
 fn positions(clip: &Motion) -> Vec<DVec3> {
     let keys = clip.set.vector_keys(Channel::Translation, 0).unwrap().keys;
     keys.iter()
@@ -44,7 +44,8 @@ fn positions(clip: &Motion) -> Vec<DVec3> {
         .collect()
 }
 
-/// Positions are the expected ones within 1e-9 of themselves, or what f32 rounds their extent by.
+/// Positions are equal to the expected ones within a relative error of 1e-9, or within the rounding
+/// of f32 for their extent.
 fn assert_near(found: &[DVec3], expected: &[DVec3], case: &str) {
     let extent = (expected[expected.len() - 1] - expected[0]).length();
     assert_eq!(found.len(), expected.len(), "{case}");

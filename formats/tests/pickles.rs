@@ -248,7 +248,7 @@ fn messages_show_little_of_a_file() {
     );
 }
 
-/// Python follows the dots of a name to a class's members; of modules of attacks nothing is read.
+/// In Python, dots in a name lead to members of a class; nothing is read from modules of attacks.
 #[test]
 fn names_that_python_would_run_are_refused() {
     for class in [

@@ -61,7 +61,7 @@ fn engine() -> Engine {
     Engine::new(Device::Cpu).unwrap()
 }
 
-/// Each by its own sampler: lines, and steps of contacts, whatever method is asked for.
+/// Each scalar by its own sampler: lines, and steps for contacts, whatever the requested method is.
 #[test]
 fn scalars_are_sampled_by_their_samplers() {
     let frames = SampleTimes::at(vec![0.25, 0.75]);
@@ -129,7 +129,7 @@ fn numbers_that_do_not_change_have_no_say_in_the_method() {
     assert_eq!(arm.numbers_method(&authored), None);
 }
 
-/// Two joints of one name are two joints: the second is told apart, with a warning.
+/// Two joints with the same name are two joints: the second gets another name, with a warning.
 #[test]
 fn equal_names_of_scalars_are_told_apart() {
     let mut clip = clip();
@@ -201,7 +201,7 @@ fn operations_keep_scalars_or_change_them_with_the_clip() {
     );
 }
 
-/// Smoothing takes scalars along, three at a time, and leaves steps as they are.
+/// Smoothing also smooths scalars, three at a time, and does not change steps.
 #[test]
 fn smoothing_smooths_scalars() {
     let clip = clip();
@@ -437,7 +437,7 @@ fn maps_name_scalars() {
     assert_eq!(clip.set.scalar(1).unwrap().times, [0.0, 0.5]);
 }
 
-/// A method that vectors have under the same name is that of scalars: `c2` is no other curve.
+/// If a method of vectors has the same name, it is used for scalars: `c2` is the same curve.
 #[test]
 fn scalars_take_the_method_that_is_asked_for() {
     let mut clip = Motion::default();

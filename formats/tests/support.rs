@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
-/// The folder of sample files from elsewhere, which a clone does not bring. Where it is missing the
-/// test says so and compares nothing.
+/// The folder of sample files of other projects, which are not in the repository. If it is missing,
+/// the test prints this and compares nothing.
 pub(crate) fn shared_data() -> Option<PathBuf> {
     let folder = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/data"));
     let found = folder.is_dir();

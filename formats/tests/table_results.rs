@@ -398,7 +398,7 @@ fn poses_are_written_as_transforms_that_are_read() {
     }
 }
 
-/// A long result leaves the writer as it comes: little of it waits in memory.
+/// A long result is written as it is computed: only a small part of it is in memory.
 #[test]
 fn rows_are_handed_on_before_the_end() {
     struct Count<'a>(&'a std::cell::Cell<usize>);

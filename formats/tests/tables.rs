@@ -217,7 +217,7 @@ fn fixtures(format: &str) -> Vec<PathBuf> {
     matching
 }
 
-/// However a table is packed, it is the same table.
+/// The content of a table does not depend on how it is packed.
 #[test]
 fn every_way_to_pack_a_table_gives_the_same_keys() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures");

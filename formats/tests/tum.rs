@@ -34,7 +34,7 @@ fn written(clip: &Motion) -> String {
         .0
 }
 
-/// Times that are near frames, but are none, are read again as they were.
+/// Times that are near frames, but not at frames, do not change when they are read again.
 #[test]
 fn times_near_frames_stay_what_they_are() {
     let line = |time: &str| format!("{time} 0 0 0 0 0 0 1\n");

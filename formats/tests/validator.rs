@@ -1,4 +1,4 @@
-//! Khronos' glTF validator, which knows nothing of us (`formats/tests/validator/`).
+//! Khronos' glTF validator, which was written independently (`formats/tests/validator/`).
 //! `scripts/test.sh` installs it.
 
 use std::path::{Path, PathBuf};
@@ -13,7 +13,7 @@ pub(crate) struct Report {
     pub(crate) warnings: Vec<String>,
 }
 
-/// A report for each of the files; `None`, and a word about it, where the validator is missing.
+/// A report for each of the files; if the validator is missing, prints this and returns `None`.
 pub(crate) fn validate(files: &[PathBuf]) -> Option<Vec<Report>> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR"));
     let package = folder.join("../target/validator");

@@ -146,7 +146,8 @@ fn seams_are_welded_within_a_distance() {
     }
 }
 
-/// One square beside two: the corner between the two lies on the side of the one.
+/// One large square next to two small ones: the corner between the two is on the side of the large
+/// one.
 #[test]
 fn a_corner_on_a_side_joins_the_faces() {
     let text = "v 0 0 0\nv 2 0 0\nv 2 2 0\nv 0 2 0\nv 2 0.7 0\nv 3 0 0\nv 3 0.7 0\nv 3 2 0\n\

@@ -15,7 +15,7 @@ fn plain() -> Mesh {
     squares((-3..3).flat_map(|x| (-3..3).map(move |y| (x, y))))
 }
 
-/// A rock so small that its clearance alone makes a disc.
+/// A rock that is so small that the area within its clearance is a disc.
 fn pebble() -> Mesh {
     let corner = |i: u32| 1e-3 * DVec3::from_array([0, 1, 2].map(|k| f64::from(u8::from(i == k))));
     let corners: Vec<DVec3> = (0..4).map(corner).collect();
@@ -60,7 +60,7 @@ fn ways_round_a_disc_are_free_and_nearly_shortest() {
     }
 }
 
-/// Every edge inside has two triangles: no vertex lies within an edge.
+/// Every inner edge has two triangles, so no vertex is in the middle of an edge.
 #[test]
 fn halving_leaves_no_gaps() {
     let (plain, rock) = (plain(), pebble());

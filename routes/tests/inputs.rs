@@ -1,4 +1,4 @@
-//! Odd meshes, and inputs that are no mesh.
+//! Unusual meshes, and inputs that are not meshes.
 
 use std::f64::consts::PI;
 
@@ -165,7 +165,7 @@ fn a_moebius_strip_has_ways_and_no_normals() {
     assert_eq!(strip.route(from, to, By::Plane), Err(RouteError::OneSided));
 }
 
-/// Three pages of a book: routes lead over its back from each to each.
+/// Three pages of a book: routes between two pages cross its spine.
 #[test]
 fn edges_of_three_faces_are_crossed() {
     let pages = [0.0, 2.0, 4.0].map(|angle: f64| dvec3(angle.cos(), 0.0, angle.sin()));

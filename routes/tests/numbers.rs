@@ -156,7 +156,7 @@ fn terrain_of_100_vertices() {
     }
 }
 
-/// Greedy goes to and fro for ever, unless no vertex is visited twice.
+/// The greedy search would go to and fro forever if vertices could be visited twice.
 #[test]
 fn dead_ends() {
     let row = |range: std::ops::RangeInclusive<i32>, y| range.map(move |x| (x, y));

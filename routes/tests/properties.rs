@@ -80,7 +80,8 @@ proptest! {
         }
     }
 
-    /// Turning, moving and scaling the mesh, and other numbers for its vertices, change nothing.
+    /// Rotating, moving and scaling the mesh, or renumbering its vertices, does not change the
+    /// routes.
     #[test]
     fn the_frame_does_not_matter(
         (mesh, [a, b, _]) in terrains(),
@@ -104,7 +105,7 @@ proptest! {
     }
 }
 
-/// Many at once are those alone.
+/// Many routes at once are equal to single ones.
 #[test]
 fn many_pairs_are_those_alone() {
     let mesh = crate::shapes::terrain();

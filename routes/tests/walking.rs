@@ -22,7 +22,7 @@ fn along_x() -> Walker {
     straight(DVec3::ZERO, dvec3(10.0, 0.0, 0.0))
 }
 
-/// Closes the stretch from 4 to 6 for a while.
+/// Closes the part of the path from 4 to 6 for some time.
 fn gate(from: f64, to: f64) -> Mover {
     let middle = dvec3(5.0, 0.0, 0.0);
     Mover {
@@ -89,7 +89,7 @@ fn who_comes_second_lets_the_first_pass() {
     }
 }
 
-/// One stands still on the line for ever; the other comes towards it.
+/// One mover stands on the line forever; another one comes towards the walker.
 #[test]
 fn who_cannot_pass_is_told() {
     let ends = straight(dvec3(5.0, 5.0, 0.0), dvec3(5.0, 0.0, 0.0));
@@ -151,7 +151,7 @@ fn a_start_is_waited_for_where_one_stands() {
     assert_arrives(&plan(&[point], &[])[0], 0.0);
 }
 
-/// Many at random: no two ever come nearer than both radii.
+/// Many random walkers: no two are ever nearer to each other than the sum of their radii.
 #[test]
 fn crowds_keep_apart() {
     let mut random = fastrand::Rng::with_seed(3);

@@ -10,8 +10,8 @@ use super::{ALL, cpu, layer, library};
 use crate::application::{Application, Commands};
 use crate::support::{Random, vulkan_devices};
 
-/// Several frames in flight, each into another buffer, in every encoding, by each choice of kernels: the bits
-/// of the CPU.
+/// Several frames in flight, each in another buffer, in every encoding and with each choice of kernels, have the
+/// CPU's bits.
 #[test]
 fn frames_are_recorded_into_an_applications_commands() {
     if vulkan_devices().is_empty() {
@@ -150,8 +150,8 @@ fn thrown_away_frames_are_told() {
     }
 }
 
-/// Lists of instances and scattered changes in frames that are recorded: the rows of the CPU's whole crowd, in a
-/// buffer with room for some.
+/// Recorded frames with lists of instances and scattered changes have the rows of the CPU's whole crowd, in a
+/// buffer with room for some of them.
 #[test]
 fn frames_of_visible_instances_are_recorded() {
     if vulkan_devices().is_empty() {

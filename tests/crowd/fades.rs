@@ -6,7 +6,7 @@ use tumble::crowd::{Crowd, CrowdError, CrowdFade, CrowdLayer, CrowdValues};
 use super::{SOME, bits, cpu, crowds, evaluated, layer, library};
 use crate::support::Random;
 
-/// Three layers each: the clips of every instance, and how its upper layers fade.
+/// The clips of each instance, in three layers, and the fades of its upper layers.
 const LAYERS: usize = 3;
 const INSTANCES: usize = 41;
 
@@ -30,7 +30,7 @@ fn set_up(crowd: &mut Crowd, plays: &[CrowdLayer]) {
     }
 }
 
-/// One jump, steps of all sizes and ways back end at the same bits, on every device.
+/// A jump, steps of all sizes and steps back give the same bits at the same time, on every device.
 #[test]
 fn a_jump_and_many_steps_fade_alike() {
     let mut random = Random(41);
@@ -76,7 +76,8 @@ fn a_jump_and_many_steps_fade_alike() {
     }
 }
 
-/// At its end a fade is exactly its target: with 1 only the clip is left, with 0 the layer is not there.
+/// At its end, a fade has exactly its target: with 1, only the layer's clip is visible; with 0, the layer
+/// has no effect.
 #[test]
 fn both_ends_of_a_fade_are_exact() {
     let mut random = Random(43);
@@ -126,7 +127,7 @@ fn both_ends_of_a_fade_are_exact() {
     }
 }
 
-/// A fade that is set while another runs goes on from the weight that was reached; setting the layer ends it.
+/// A fade that is set while another one runs continues from the current weight; setting the layer ends the fade.
 #[test]
 fn fades_take_over_from_each_other() {
     let mut random = Random(47);
@@ -155,7 +156,8 @@ fn fades_take_over_from_each_other() {
     assert_eq!(crowd.get_fade(0, 1).unwrap(), Some(expected));
 }
 
-/// Layers and fades read from a crowd and set in another one at the same time play on alike.
+/// Layers and fades that are read from a crowd, and set in another one at the same time of the
+/// clock, continue in the same way.
 #[test]
 fn a_saved_crowd_fades_on_as_before() {
     let mut random = Random(53);

@@ -57,7 +57,7 @@ impl<'a> Matrices<'a> {
     }
 }
 
-/// Changes a few numbers, also to such as no evaluation gives.
+/// Changes a few numbers, also to values that no evaluation gives.
 fn change(random: &mut Random, rows: &mut [[f32; 4]]) {
     for _ in 0..rows.len() / 9 {
         let row = random.next() as usize % rows.len();
@@ -103,7 +103,7 @@ fn record(crowd: &mut Crowd, commands: &Commands<'_>, targets: &[&CrowdTarget]) 
     commands.run(&[recorded]);
 }
 
-/// The host, or commands between the stages, change matrices: every stage has the bits of the CPU, on every device, by
+/// The host, or commands between the stages, change matrices: every stage has the CPU's bits, on every device, with
 /// each choice of kernels, also in several windows. Bytes around the range stay.
 #[test]
 fn stages_continue_what_the_application_has_changed() {

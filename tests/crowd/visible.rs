@@ -16,7 +16,8 @@ pub(super) fn some(random: &mut Random, instances: usize, count: usize) -> Vec<u
     all
 }
 
-/// Lists that grow, shrink and go, with changes meanwhile: each row is the whole crowd's.
+/// Lists that grow, shrink and are removed, with changes between them: each row is that of the
+/// whole crowd.
 #[test]
 fn visible_instances_have_the_rows_of_the_whole_crowd() {
     let mut random = Random(61);

@@ -378,7 +378,7 @@ fn followers_are_the_reference_s() {
     assert!(rms < 1e-7, "{rms:e}");
 }
 
-/// Paths that ask for trouble: stops, reversals, corners, straight lines, vertical ones, one point.
+/// Difficult paths: stops, reversals, corners, straight lines, vertical ones, a single point.
 pub(super) fn trouble() -> TrackSet {
     let mut random = Random(3);
     let mut set = TrackSet::new();
@@ -477,7 +477,8 @@ pub(super) fn accepted(set: &TrackSet, follow: &Follow) -> TrackSet {
     subset
 }
 
-/// Every rotation is one, at every moment of every path, and all devices and widths give the same.
+/// Every rotation is a unit quaternion, at every time of every path, and all devices and widths give
+/// the same bits.
 #[test]
 fn the_same_bits_on_every_device() {
     let set = trouble();
@@ -540,8 +541,8 @@ fn paths_are_followed_together_as_alone() {
     }
 }
 
-/// A body looks at one that does not look back: the direction is that to where the other is at each
-/// moment.
+/// A body faces another one that does not face it: the direction at each time is that to the other's
+/// position.
 #[test]
 fn a_body_looks_at_another() {
     let mut random = Random(8);

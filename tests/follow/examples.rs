@@ -247,7 +247,7 @@ fn the_fixed_frame() {
     assert_rotation(follower.walk().pose(0.3).1, expected, 2e-9);
 }
 
-/// A helix turns by its torsion; closed curves by all of theirs.
+/// On a helix the body rotates by the torsion; on closed curves by the sum of the torsion.
 #[test]
 fn what_is_left_over_after_a_round() {
     let helix = Follower {

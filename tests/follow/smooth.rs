@@ -363,7 +363,7 @@ fn still_tracks_keep_their_bits_and_even_motion_stays() {
     }
 }
 
-/// Turning all samples from the left or from the right turns the result.
+/// Multiplying all samples by a rotation, on the left or on the right, multiplies the result by it.
 #[test]
 fn smoothing_turns_with_its_samples() {
     let engine = cpu();
@@ -388,7 +388,8 @@ fn smoothing_turns_with_its_samples() {
     }
 }
 
-/// About one axis it is the filter of numbers, within 3e-7 of the largest and 1e-6 rad.
+/// For rotations about one axis the result is that of the filter for numbers, within 3e-7 of the
+/// largest and 1e-6 rad.
 #[test]
 fn about_one_axis_it_is_the_scalar_filter() {
     let mut random = Random(10);

@@ -14,9 +14,9 @@ use tumble_exact::{FloatControls, float_controls, without_decorations};
 
 /// Where the child writes its listings.
 const FOLDER: &str = "MESA_LISTINGS";
-/// The kernels to compile, with spaces between them; all where it is not set.
+/// The kernels to compile, separated by spaces; all if it is not set.
 const KERNELS: &str = "MESA_KERNELS";
-/// Set where the exactness pass is to be undone.
+/// Set if the exactness pass is to be undone.
 const BARE: &str = "MESA_WITHOUT_THE_PASS";
 
 /// The line before each representation of a kernel.
@@ -105,8 +105,8 @@ impl Compiler {
         }
     }
 
-    /// Compiles a module, and says what the driver says of it: a line for each statistic, then
-    /// every representation after a line with its name.
+    /// Compiles a module, and prints the driver's information about it: a line for each statistic,
+    /// then every representation after a line with its name.
     fn listing(&self, reads_texels: bool, words: &[u32]) -> String {
         let bindings = binding_count(words);
         let kind = |binding| match reads_texels && binding + 1 < bindings {

@@ -52,7 +52,7 @@ fn the_newer_lavapipe_gives_the_same_bits() {
     std::fs::remove_dir_all(&cache).unwrap();
 }
 
-/// Run by the test above it, in a process of its own.
+/// The test above runs this in a separate process.
 #[test]
 #[ignore = "says which driver there is; run by the_newer_lavapipe_gives_the_same_bits"]
 fn names_its_driver() {

@@ -10,7 +10,7 @@ use super::compile::{representations, statistics};
 pub(super) enum Generation {
     /// Its `v_mad_f32` and `v_mac_f32` round the product, then the sum.
     Gcn,
-    /// All that multiplies and adds at once rounds once.
+    /// On these, every multiply-add rounds once.
     Rdna,
 }
 
@@ -202,7 +202,7 @@ fn is_power_of_two(operand: &str) -> bool {
     value.is_some_and(|value: f32| value.is_normal() && value.to_bits() & MANTISSA == 0)
 }
 
-/// The judge can refuse, and knows what it may not.
+/// The check refuses instructions that round otherwise, and accepts exact ones.
 #[test]
 fn what_rounds_otherwise_is_refused() {
     use Generation::{Gcn, Rdna};

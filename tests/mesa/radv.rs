@@ -187,7 +187,8 @@ fn every_kernel_is_exact_on_families_in_turn() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
-/// The negative control: without the exactness pass the same compilers fuse, and the judge sees it.
+/// The negative control: without the exactness pass, the same compilers fuse operations, and the check
+/// finds it.
 #[test]
 fn without_the_pass_products_and_sums_are_fused() {
     let kernels = ["arc_frames_f32", "polynomial_frames_f32"];

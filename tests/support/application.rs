@@ -1,4 +1,4 @@
-//! A device as an application makes it.
+//! A Vulkan device that is created as an application would create it.
 #![allow(unsafe_code)] // creating a device is the application's part
 #![allow(dead_code)] // each test program uses some of it
 
@@ -102,7 +102,7 @@ impl Application {
         }
     }
 
-    /// An engine on it, which must go first.
+    /// An engine on this device; it must be dropped before the device.
     pub(crate) fn engine(&self, mapping: Mapping) -> Engine {
         self.try_engine(mapping).unwrap()
     }

@@ -40,7 +40,7 @@ pub fn prepare_arcs(kernel: (Reads, Mapping)) -> PrepareArcs {
     }
 }
 
-/// How uploads come to a device whose results are staged, and how these are copied back.
+/// How uploads reach a device whose results are staged, and how these results are copied back.
 pub const STAGED: [(Uploads, ReadBack); 3] = [
     (Uploads::Staged, ReadBack::SameQueue),
     (Uploads::Direct, ReadBack::Overlapped),
@@ -143,8 +143,8 @@ impl Random {
     }
 }
 
-/// A set that asks for trouble: steps from 1e-7 rad to pi, components of 1e-30, gaps of one frame and of a thousand seconds, one and two keys, tracks
-/// that start and end at different times.
+/// A difficult set: steps from 1e-7 rad to pi, components of 1e-30, gaps of one frame and of a thousand seconds, one
+/// and two keys, tracks that start and end at different times.
 pub fn hostile_set(seed: u64, tracks: usize) -> TrackSet {
     let mut random = Random(seed);
     let mut set = TrackSet::new();

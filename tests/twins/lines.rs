@@ -40,7 +40,7 @@ use super::numbers::{Kind, Number, is_planted, is_touched};
 /// Workgroups of a dispatch that are run, of all that it has.
 const WORKGROUPS: u32 = 60;
 
-/// Invocations that a card runs together, and the bytes that it moves together.
+/// The number of invocations that a card runs together, and of bytes that it moves together.
 pub(super) const CARDS: [(u32, u64); 6] =
     [(32, 32), (32, 64), (32, 128), (64, 32), (64, 64), (64, 128)];
 
@@ -189,7 +189,7 @@ fn bytes<T: bytemuck::NoUninit>(values: &[T]) -> Vec<u8> {
     bytemuck::cast_slice(values).to_vec()
 }
 
-/// Lines that waves touched, and the fewest that would have done.
+/// The lines that waves touched, and the smallest possible number.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Lines {
     touched: u64,
@@ -656,7 +656,8 @@ fn assert_touches_hardly_more_lines(name: &str, launch: &Launch) {
     );
 }
 
-/// The count sees what the other mapping does: neighbours store 256 bytes from each other.
+/// The negative control: with the other mapping, neighbours store 256 bytes from each other, and
+/// the count is higher.
 #[test]
 fn an_item_for_each_invocation_touches_more_lines() {
     let (set, frames) = sparse(96);

@@ -23,7 +23,7 @@ pub(super) enum Rule {
     /// Products are `fma(a, b, 0)`, as SPIRV-Cross writes them for Metal: where a factor is 0, the product is +0
     /// whatever the signs; one that is too small keeps its sign.
     FusedWithZero,
-    /// As written, and every [`Spot`] is listed.
+    /// As written; every [`Spot`] is listed.
     Listing,
     /// With a mistake. A constant is multiplied by the factor.
     Mistaken(Spot, f32),

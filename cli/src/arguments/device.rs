@@ -18,7 +18,7 @@ use crate::drivers;
 use crate::messages::exit::{DEVICE, Failure};
 use crate::messages::words;
 
-/// Rotations evaluated at once: 16 MB.
+/// The number of rotations that are evaluated at once: 16 MB.
 const CHUNK: usize = 1 << 20;
 
 /// The number of values of a chunk of a result: at least a row.
@@ -145,7 +145,7 @@ impl DeviceArguments {
         }
     }
 
-    /// So many threads of the CPU.
+    /// Sets the number of threads of the CPU.
     pub(crate) fn set_threads(&mut self, threads: Option<usize>) {
         self.threads = threads;
     }
@@ -230,7 +230,8 @@ impl DeviceArguments {
         })
     }
 
-    /// The first device that opens and is exact; else why the first one is not.
+    /// The first device that opens and is exact; otherwise the reason why the first one is not
+    /// used.
     fn first_exact(&self) -> Result<Engine, Error> {
         let mut reason = Error::Vulkan(VulkanError::NoDevice);
         for (index, device) in drivers::devices()?.into_iter().enumerate() {
@@ -260,7 +261,7 @@ impl OpenedDevice {
         self.engine.device_info().is_some()
     }
 
-    /// Chooses the device for `rotations`, where the size of a job decides.
+    /// Chooses the device for a job of `rotations`, if the device depends on the size of the job.
     pub(crate) fn choose(&mut self, rotations: usize) -> Result<(), Error> {
         if let Some(by_cost) = &mut self.by_cost {
             self.engine = by_cost.engine(rotations)?;
@@ -410,8 +411,8 @@ fn short_reason(error: &Error) -> String {
     }
 }
 
-/// The device of that index, else of that name, else of a name that contains the text (a card's name may
-/// be a number). After `uuid:` stands the UUID that Vulkan reports, by which other programs know the card.
+/// The device with this index, or this name, or a name that contains the text (a card's name may be a
+/// number). After `uuid:` is the UUID that Vulkan reports, by which other programs know the card.
 fn named(requested: &str, devices: &[Device]) -> Result<Device, Failure> {
     if devices.is_empty() {
         return Err(Failure::no_vulkan(&VulkanError::NoDevice));

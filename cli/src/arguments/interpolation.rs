@@ -111,7 +111,8 @@ impl InterpolationArguments {
         checked.map_err(|message| Failure::usage(format!("{name}: {message}")))
     }
 
-    /// Refuses `--signs` where no track takes it: one with tangents, by a method that prescribes their signs.
+    /// Refuses `--signs` if no track takes it. A track with tangents, by a method that prescribes their signs,
+    /// does not.
     fn check_signs(self, methods: &[Method], clip: &Motion) -> Result<(), String> {
         let takes = |method: &Method| method.signs.is_none() || method.signs == self.signs;
         let has_tangents = clip.set.tracks().all(|track| !track.tangents.is_empty());

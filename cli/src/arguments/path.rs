@@ -186,7 +186,7 @@ fn methods() -> impl TypedValueParser<Value = VectorMethod> {
 }
 
 impl PathArguments {
-    /// Refuses these options where there are no paths.
+    /// Refuses these options if there are no paths.
     pub(crate) fn refuse(command_line: &CommandLine, on: &str) -> Result<(), Failure> {
         command_line.refuse_group::<Self>(on, "it is for files of paths; leave it out")
     }

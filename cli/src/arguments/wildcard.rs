@@ -20,7 +20,7 @@ enum PatternPart {
     Character(char),
     Any,
     Many,
-    /// Ranges of characters, both ends of them; whether it is one of the others.
+    /// Ranges of characters with both ends, and whether the other characters match instead.
     Class(Vec<(char, char)>, bool),
 }
 
@@ -139,7 +139,7 @@ pub(crate) struct PathPattern {
 #[derive(Debug, Clone, PartialEq)]
 enum PathPart {
     Name(Wildcard),
-    /// Any folders, also none.
+    /// Any number of folders, also none.
     Folders,
 }
 
@@ -357,7 +357,7 @@ mod tests {
         assert!(PathPattern::new("a/[b").unwrap_err().contains("no end"));
     }
 
-    /// It would take longer than the universe is old to try every split.
+    /// Trying every split would take longer than the age of the universe.
     #[test]
     fn many_stars_take_no_time() {
         let wildcard = Wildcard::new(&format!("{}b", "*a".repeat(200))).unwrap();

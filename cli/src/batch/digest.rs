@@ -44,7 +44,7 @@ pub(crate) struct InputFile {
 }
 
 impl InputFile {
-    /// Before it is read, within the limits of the program.
+    /// Identifies an input before it is read, within the limits of the program.
     pub(crate) fn new(path: &Path) -> Self {
         Self::within(path, Limits::default())
     }

@@ -768,8 +768,8 @@ impl BatchRecords<'_> {
         if !self.made.insert(name.to_owned()) {
             let input = names::input(work.path());
             return Err(Failure::usage(format!(
-                "{input}: another input's result is {name} already; give --names full, or evaluate them into \
-                 different directories"
+                "{input}: another input's result is {name} already; give --names full, or write the results \
+                 to different directories"
             )));
         }
         let bytes = result.written.bytes;

@@ -181,7 +181,7 @@ pub(crate) fn refuse_shared_names(
         let shown = name.display().to_string();
         if let Some(other) = owners.insert(name, &found.path) {
             return Err(Failure::usage(format!(
-                "{} and {} would both write {shown}; give --names full, or evaluate them into different \
+                "{} and {} would both write {shown}; give --names full, or write the results to different \
                  directories",
                 names::input(other),
                 names::input(&found.path),

@@ -40,7 +40,7 @@ fn of_samples(tracks: usize, samples: usize) -> String {
     format!("{tracks} × {samples}")
 }
 
-/// Refuses more samples than anybody waits for, or sees in a picture.
+/// Refuses more samples than can be seen in a picture or computed in a reasonable time.
 pub(crate) fn to_draw(name: &str, samples: usize) -> Result<(), Failure> {
     const MAX_DRAWN: usize = 1 << 24;
     match samples <= MAX_DRAWN {

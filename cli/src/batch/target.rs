@@ -500,7 +500,8 @@ impl Destination {
         Err(Failure::usage(format!("{self}: {message}")))
     }
 
-    /// Refuses bytes that are not text on a terminal, which would obey some of them.
+    /// Refuses to write bytes that are not text to a terminal, which would interpret some of them
+    /// as commands.
     pub(crate) fn refuse_terminal(&self, format: &Format) -> Result<(), Failure> {
         if format.is_text || !self.is_standard() || !io::stdout().is_terminal() {
             return Ok(());
@@ -675,7 +676,7 @@ struct FinishedStream {
     output: Output,
     digest: Option<Digest>,
     bytes: u64,
-    /// Its reader went away.
+    /// The reader has closed the stream.
     broken_pipe: bool,
 }
 
@@ -737,7 +738,7 @@ mod tests {
 
     use super::*;
 
-    /// Shards that begin together all want the directory of their results.
+    /// Shards that begin at the same time create the directory of their results at the same time.
     #[test]
     fn a_directory_may_be_made_by_many_at_once() {
         let directory = tempfile::tempdir().unwrap();

@@ -314,7 +314,7 @@ fn merging_removes_nothing_elsewhere() {
     assert_eq!(fs::read(&part).unwrap(), b"not ours");
 }
 
-/// A shard's file with the hash of its lines in the first one, as the program writes it.
+/// The record of a shard with the hash of its lines in the first line, as the program writes it.
 fn fitting(text: &str) -> String {
     use sha2::{Digest, Sha256};
 
@@ -327,7 +327,7 @@ fn fitting(text: &str) -> String {
     format!("{header}\n{lines}")
 }
 
-/// A shard that lost a line is not done; a plan of no shards is none.
+/// A shard whose record has lost a line is not done; a plan without shards is invalid.
 #[test]
 fn records_of_shards_are_whole_or_made_again() {
     let temporary = sample_folder();
@@ -543,7 +543,7 @@ fn pictures_are_refused_before_anything_is_written() {
     assert_eq!(entries(folder), before);
 }
 
-/// A folder of results may lie below the folder of its inputs, or be it.
+/// The folder of the results may be below the folder of the inputs, or the same folder.
 #[test]
 fn results_are_no_inputs_of_the_next_run() {
     let temporary = sample_folder();

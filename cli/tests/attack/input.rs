@@ -53,7 +53,7 @@ fn animations(faults: [(usize, usize); 2]) -> String {
     )
 }
 
-/// Inputs that are broken as a whole or in part, with the code of a command that works on each alone.
+/// Inputs that are broken completely or in part, and the exit code of a command with only this input.
 fn broken(folder: &Path) -> Vec<(&'static str, i32)> {
     let cases = [
         ("nothing_moves.gltf", NOTHING_MOVES.to_owned(), 4),
@@ -105,7 +105,8 @@ fn taking_inputs() -> Vec<Vec<String>> {
     all
 }
 
-/// Every input has a line, whatever stands beside it, and the exit code is that of the worst.
+/// The output has a line for every input, whatever the other inputs are; the exit code is that of
+/// the worst one.
 #[test]
 fn no_input_ends_without_a_line() {
     let mut random = Random(18);
@@ -183,7 +184,7 @@ fn all_broken_animations_are_told() {
     }
 }
 
-/// Escapes, line ends, and marks that turn text round.
+/// Escape sequences, line ends, and marks that reverse the direction of text.
 const NAMES: [&str; 2] = [
     "\x1b]0;FORGED\x07\x1b[2J\x1b[1;1H\u{9b}31mFORGED\u{202e}",
     "a\nFORGED: unchanged since they were written\r\x1b[KFORGED",
@@ -197,8 +198,8 @@ fn is_quiet(text: &str, line: &[&str]) {
     assert_eq!(forged, None, "{line:?}: {text:?}");
 }
 
-/// Names in files and of files, URIs, headers, lists and manifests: nothing that a terminal obeys comes
-/// through, and no name begins a line.
+/// Names in files, names of files, URIs, headers, lists and manifests: messages contain nothing that a
+/// terminal obeys, and no name begins a line.
 #[test]
 fn no_name_reaches_a_terminal_as_it_is() {
     let json = |name: &str| serde_json::to_string(name).unwrap();
@@ -408,8 +409,8 @@ const NUMBERS: [&str; 14] = [
     "\"\"",
 ];
 
-/// A file of a format, broken where its structure is: numbers of JSON and of text, words of four and eight
-/// bytes in what is binary, parts that are there twice, or that go.
+/// Damages the structure of a file: numbers in JSON and text, words of four and eight bytes in binary data,
+/// repeated and missing parts.
 fn mutated(bytes: &[u8], random: &mut Random) -> Vec<u8> {
     let mut below = |limit: usize| random.next() as usize % limit.max(1);
     let mut bytes = bytes.to_vec();

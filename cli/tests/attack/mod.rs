@@ -34,7 +34,7 @@ fn succeed(folder: &Path, line: &[&str]) -> Run {
     run
 }
 
-/// Waits for a program, and ends it where it hangs.
+/// Waits for a program, and kills it if it hangs.
 fn ended(command: &mut Command) -> Run {
     let mut child = command.spawn().unwrap();
     let process = child.id();
@@ -105,7 +105,7 @@ fn entries(directory: &Path) -> BTreeSet<String> {
     found
 }
 
-/// The files that writers leave half-way.
+/// The files that writers leave if they are killed.
 fn parts(directory: &Path) -> Vec<String> {
     let all = entries(directory).into_iter();
     all.filter(|name| name.ends_with(".part")).collect()

@@ -1,4 +1,4 @@
-//! Names of any kind: one input's trouble is one input's failure.
+//! Names of any kind: if an input cannot be processed because of its name, only this input fails.
 
 use std::ffi::OsStr;
 use std::fs;
@@ -8,7 +8,8 @@ use crate::attack::{entries, run, succeed, two_animations};
 use crate::program::sample_folder;
 use crate::tree::tree;
 
-/// Names that are too long, no text, or strange; the others are made, and resuming ends.
+/// Names that are too long, not UTF-8, or unusual: the results of the other inputs are made, and
+/// resuming ends.
 #[test]
 fn no_name_ends_a_batch() {
     let temporary = sample_folder();
@@ -156,7 +157,8 @@ fn one_clip_that_cannot_be_written_does_not_end_the_others() {
     succeed(folder, &["check", "out"]);
 }
 
-/// Inputs whose results would share a name fail, and no other; whole names tell two of one stem apart.
+/// Only inputs whose results would have the same name fail; `--names full` distinguishes two with the
+/// same stem.
 #[test]
 fn results_never_share_a_name() {
     let temporary = sample_folder();

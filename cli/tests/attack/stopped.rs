@@ -182,7 +182,7 @@ fn what_was_left_anywhere_below_a_folder_of_results_goes() {
     assert_eq!(parts(&folder.join("out")), Vec::<String>::new());
 }
 
-/// Some seconds of text, of which a first part is on its way.
+/// Writing this text takes some seconds; a first part has been written.
 fn writing(at: &Path, ignored: Option<&str>) -> Child {
     let line = "eval a.dat --fps 1000000 --device cpu -o out/o.csv";
     let program = env!("CARGO_BIN_EXE_tumble");

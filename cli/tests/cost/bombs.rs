@@ -91,7 +91,7 @@ fn channels_that_share_a_sampler() {
     assert_eq!(fault.code, Code::Memory, "{fault}");
 }
 
-/// Each animation of a leaf has the whole chain that the leaf hangs on.
+/// Each animation of a leaf contains the whole chain of the leaf's ancestors.
 #[test]
 fn animations_of_the_end_of_a_chain() {
     let _one = one_at_a_time();
@@ -259,7 +259,7 @@ fn members_that_lie_upon_each_other() {
     assert_eq!(fault.code, Code::Archive, "{fault}");
 }
 
-/// Twelve bytes that say that the header has four gigabytes, and brackets in brackets.
+/// Twelve bytes state a header of 4 GB, and brackets are nested deeply.
 #[test]
 fn headers_of_arrays() {
     let _one = one_at_a_time();

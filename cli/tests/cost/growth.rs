@@ -39,7 +39,8 @@ struct Case {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Expected {
     Read,
-    /// Refused where they take more than a file of their length may; up to there they may take the square.
+    /// Such files are refused if they take more than a file of their length may; below this limit the cost
+    /// may be quadratic.
     ReadOrRefused,
 }
 
@@ -113,7 +114,7 @@ fn written_cases() -> Vec<Case> {
     cases
 }
 
-/// An FBX file with as many nodes, layers and stacks, each with a curve; a layer's keys are at times of its own.
+/// An FBX file with so many nodes, layers and stacks, each with a curve; the keys of each layer have other times.
 fn fbx([nodes, layers, stacks]: [usize; 3], letters: usize) -> Vec<u8> {
     const SECOND: usize = 46_186_158_000;
     let mut objects = String::new();

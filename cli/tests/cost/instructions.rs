@@ -232,7 +232,7 @@ const POSES: &str = "poses";
 
 const KEPT_ROTATIONS: usize = 16 * 600;
 
-/// Run by the test above it, in a process of its own.
+/// The test above runs this in a separate process.
 #[test]
 #[ignore = "part of rotations_of_kept_clips_cost_no_more_than_they_did"]
 fn evaluates_a_kept_clip() {

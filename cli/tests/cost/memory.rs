@@ -87,7 +87,7 @@ fn reading(input: impl Read) -> (Result<Loaded, Diagnostic>, usize) {
     peak_of(|| read_dat("t", reader, &ReadOptions::default()))
 }
 
-/// Lines made when they are read: a file that is nowhere.
+/// A file that is not stored: its lines are made when they are read.
 struct Lines<F> {
     make: F,
     number: usize,
@@ -167,7 +167,7 @@ fn a_large_file_is_read_in_bounded_extra_memory() {
 }
 
 #[cfg(target_os = "linux")]
-/// The most memory that was resident since this was last asked to begin anew, bytes.
+/// The most memory that was resident since the last reset, in bytes.
 fn resident(begin: bool) -> usize {
     if begin {
         std::fs::write("/proc/self/clear_refs", "5").unwrap();

@@ -2,7 +2,7 @@
 //! Only the names that a loader looks for need `unsafe`.
 #![allow(unsafe_code, missing_docs)]
 
-/// With the status that the environment names, 0 too.
+/// Ends the process with the status in the environment variable, which may be 0.
 fn end() -> ! {
     match std::env::var("CRASH_STATUS") {
         // Destructors would wait for the loader's lock, and the loader for this function.

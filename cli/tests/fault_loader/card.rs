@@ -160,7 +160,7 @@ unsafe extern "system" fn vkQueueSubmit(
     SUCCESS
 }
 
-/// Hands over what was held back.
+/// Submits the work that was held back.
 fn release() {
     let mut queues = queues();
     let held = std::mem::take(&mut queues.held);

@@ -16,7 +16,7 @@
 //! program finds it as `libvulkan.so.1`.
 #![allow(unsafe_code, non_snake_case, clippy::missing_safety_doc, missing_docs)]
 
-/// The real function of a name, of a type that the caller knows.
+/// The real function with this name; the caller knows its type.
 macro_rules! real {
     ($name:literal as fn($($argument:ty),*) $(-> $result:ty)?) => {
         std::mem::transmute::<Pointer, unsafe extern "system" fn($($argument),*) $(-> $result)?>(
@@ -53,7 +53,7 @@ struct Fault {
 struct State {
     instance: Word,
     calls: HashMap<&'static str, u64>,
-    /// A device that is lost stays so.
+    /// A lost device stays lost.
     lost: bool,
     /// Bytes of each allocation.
     memory: HashMap<Word, u64>,

@@ -58,7 +58,7 @@ fn a_card_copies_beside_its_kernels_and_is_written_where_the_host_sees_it() {
     }
 }
 
-/// Run by the test above, in a process of its own.
+/// The test above runs this in a separate process.
 #[test]
 #[ignore = "part of a_card_copies_beside_its_kernels_and_is_written_where_the_host_sees_it"]
 fn card_work() {
@@ -174,14 +174,14 @@ fn check_application_device(change: impl Fn(&mut Application)) {
     }
 }
 
-/// Run by the test above, in a process of its own.
+/// The test above runs this in a separate process.
 #[test]
 #[ignore = "part of an_application_names_the_queue_that_copies"]
 fn one_queue() {
     check_application_device(|application| application.copy_queue = None);
 }
 
-/// Run by the test above, in a process of its own.
+/// The test above runs this in a separate process.
 #[test]
 #[ignore = "part of an_application_names_the_queue_that_copies"]
 fn two_queues() {

@@ -1,4 +1,4 @@
-//! The library under faults, in uses that the program has not.
+//! Faults during uses of the library that the program does not have.
 
 use std::collections::BTreeMap;
 use std::process::Command;
@@ -72,7 +72,7 @@ fn a_fault_in_the_library_is_an_error_and_leaks_nothing() {
     });
 }
 
-/// Run by the test above, in a process of its own.
+/// The test above runs this in a separate process.
 #[test]
 #[ignore = "part of a_fault_in_the_library_is_an_error_and_leaks_nothing"]
 fn library_work() {
@@ -135,7 +135,7 @@ fn library_work() {
     }
 }
 
-/// A crowd, handed in and asked for until it is done.
+/// A crowd that is submitted, and polled until it is done.
 pub(super) fn crowd_work(engine: &Engine) -> Result<(), CrowdError> {
     let skeleton = Skeleton::new(vec![None, Some(0)], vec![Vec3::Y; 2]).unwrap();
     let mut library = CrowdLibrary::new(&skeleton)?;

@@ -35,7 +35,7 @@ pub(super) fn example(name: &str) -> PathBuf {
 }
 
 impl Loader {
-    /// Nothing where there is no Vulkan to go wrong.
+    /// `None` if there is no Vulkan in which calls could fail.
     pub(super) fn new() -> Option<Self> {
         if vulkan_devices().is_empty() {
             return None;

@@ -48,7 +48,7 @@ fn what_binds_more_storage_buffers_than_there_are_is_refused_by_name() {
     assert_eq!(log.left, BTreeMap::new());
 }
 
-/// Run by the test above, in another process.
+/// The test above runs this in a separate process.
 #[test]
 #[ignore = "part of what_binds_more_storage_buffers_than_there_are_is_refused_by_name"]
 fn four_buffers() {
@@ -107,7 +107,7 @@ fn memory_that_is_cached_and_not_coherent_is_made_visible() {
     assert!(log.card["flushed"] > 0, "{log:?}");
 }
 
-/// Run by the test above, in another process.
+/// The test above runs this in a separate process.
 #[test]
 #[ignore = "part of memory_that_is_cached_and_not_coherent_is_made_visible"]
 fn incoherent() {
@@ -201,7 +201,7 @@ fn a_card_is_probed_once() {
     assert!(run.words.contains("chosen: llvmpipe") || run.words.contains("chosen: lavapipe"));
 }
 
-/// Run by the test above, in other processes.
+/// The test above runs this in separate processes.
 #[test]
 #[ignore = "part of a_card_is_probed_once"]
 fn automatic() {
@@ -240,7 +240,7 @@ fn what_the_driver_compiled_is_kept() {
     }
 }
 
-/// Run by the test above, in other processes.
+/// The test above runs this in separate processes.
 #[test]
 #[ignore = "part of what_the_driver_compiled_is_kept"]
 fn warm() {
@@ -272,7 +272,7 @@ fn an_applications_device_is_not_waited_for() {
     }
 }
 
-/// Run by the test above, in other processes.
+/// The test above runs this in separate processes.
 #[test]
 #[ignore = "part of an_applications_device_is_not_waited_for"]
 fn borrowed() {
@@ -303,7 +303,7 @@ fn clips_and_streams_keep_to_the_memory_of_a_device() {
     assert_eq!((log.short, log.left), (0, BTreeMap::new()));
 }
 
-/// Run by the test above, in another process.
+/// The test above runs this in a separate process.
 #[test]
 #[ignore = "part of clips_and_streams_keep_to_the_memory_of_a_device"]
 fn bounded() {

@@ -22,7 +22,7 @@ fn allocations(calls: &BTreeMap<String, usize>) -> BTreeMap<&str, usize> {
     all.filter(|(call, _)| allocates(call)).collect()
 }
 
-/// A hundred results at other places of the buffer take the sets of descriptors of one.
+/// A hundred results at different offsets of the buffer use the descriptor sets of one.
 #[test]
 fn what_is_recorded_elsewhere_takes_the_same_descriptors() {
     let Some(loader) = Loader::new() else { return };
@@ -41,7 +41,7 @@ fn what_is_recorded_elsewhere_takes_the_same_descriptors() {
     assert_eq!(once, often);
 }
 
-/// Run by the test above, in another process.
+/// The test above runs this in a separate process.
 #[test]
 #[ignore = "part of what_is_recorded_elsewhere_takes_the_same_descriptors"]
 fn records_at_many_places() {

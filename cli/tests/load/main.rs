@@ -164,7 +164,7 @@ fn sixteen_gigabytes_of_output() {
     assert!(peak_memory("/proc/self/status") < 4.3e3);
 }
 
-/// One result of more than 2^32 rotations, and samples of it by themselves.
+/// A result of more than 2^32 rotations, compared with single samples of it.
 #[test]
 #[ignore = "69 GB of rotations, some minutes"]
 fn indices_beyond_32_bits() {

@@ -20,8 +20,8 @@ pub(crate) fn pendulum() -> (Vec<f64>, Vec<Quat>) {
     (times, [about(Vec3::Z), about(Vec3::X)].concat())
 }
 
-/// A folder with `a.dat`, `b.dat` and `folder/a.dat` (good), `bad.dat` (not), and
-/// `old.npy`, which no command may change unasked.
+/// A folder with the valid files `a.dat`, `b.dat` and `folder/a.dat`, the invalid file `bad.dat`,
+/// and `old.npy`, which a command may change only if it is told to.
 pub(crate) fn sample_folder() -> tempfile::TempDir {
     let (times, keys) = pendulum();
     let mut text = String::from("# 2 3\n");

@@ -5,7 +5,7 @@ use std::fs;
 use crate::program::{run, sample_folder, succeed};
 use crate::view::{apart, evaluated, page, quat};
 
-/// A thousand boxes: right, and how fast (no test of speed: it is only said).
+/// A thousand boxes are drawn correctly; the speed is printed, and not tested.
 #[test]
 fn a_thousand_boxes_are_shown() {
     let folder = sample_folder();

@@ -72,7 +72,7 @@ impl LogBuilder {
 pub(crate) struct Message(Vec<u8>);
 
 impl Message {
-    /// With a header, whose stamp is in nanoseconds.
+    /// A message that begins with a header; its stamp is in nanoseconds.
     pub(crate) fn stamped(stamp: u64, frame: &str) -> Self {
         Self(vec![0, 1, 0, 0]).header(stamp, frame)
     }

@@ -216,7 +216,7 @@ fn npyz_shape(array: &[u8]) -> Vec<u64> {
         .to_vec()
 }
 
-/// Where both `poses` and its pieces are there, all of them are written.
+/// If a file has both `poses` and the arrays of its parts, all of them are written.
 #[test]
 fn poses_and_their_pieces_stay_the_same() {
     let Some(path) = sample("smplx_like.npz") else {
@@ -299,7 +299,7 @@ fn what_does_not_fit_the_layout_is_refused() {
     assert_eq!(document.frames(0, rate).unwrap_err().code, Code::Layout);
 }
 
-/// A file whose rate was given from outside says it from then on.
+/// If the rate of a file was stated by an option, the rewritten file states it.
 #[test]
 fn a_rate_is_added_where_there_was_none() {
     let options = ReadOptions {

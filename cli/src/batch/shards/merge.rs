@@ -19,7 +19,7 @@ use crate::batch::target;
 use crate::messages::exit::{ALL_INPUTS, DIFFERENCE, Failure};
 use crate::messages::words;
 
-/// How many shards' files are in memory at once; neighbouring results are mostly of one shard.
+/// How many files of shards are in memory at once; neighbouring results are mostly of one shard.
 const MAX_CACHED_FILES: usize = 16;
 
 /// The outcome of merging.
@@ -32,12 +32,12 @@ pub(crate) struct MergeSummary {
     pub(crate) failed: Vec<RefusedInput>,
 }
 
-/// Where the results are that a manifest lists.
+/// Where the results of a manifest are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum ResultLocation {
     /// In the directory of the manifest.
     Beside,
-    /// In an object store, of which the directory has the shards' records alone.
+    /// In an object store; the directory has only the records of the shards.
     Store,
 }
 

@@ -248,7 +248,7 @@ fn resident<'a>(
     Ok(Some(contestant))
 }
 
-/// Into memory of the caller's that is used again: that of a device that copies its results.
+/// Into reused memory of the caller, for a device that copies its results.
 fn into_host_memory<'a>(
     clip: &'a Clip,
     workload: &'a Workload,
@@ -259,7 +259,7 @@ fn into_host_memory<'a>(
     }
 }
 
-/// Into memory of the device's choice, as a caller gets it fastest where that is the host's too.
+/// Into memory that the device chooses, which is the fastest for a caller if it is also the host's.
 fn on_device<'a>(
     clip: &'a Clip,
     workload: &'a Workload,

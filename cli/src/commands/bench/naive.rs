@@ -75,7 +75,7 @@ pub(crate) fn cubic_pose(
     }
 }
 
-/// Where in an interval a time is, from 0 to 1.
+/// The position of a time in an interval, from 0 to 1.
 fn parameter(track: Track<'_>, i: usize, time: f64) -> f32 {
     let (start, end) = (track.times[i], track.times[i + 1]);
     ((time - start) / (end - start)) as f32
@@ -102,7 +102,7 @@ fn each_track(
         });
 }
 
-/// The interval of a time that only grows.
+/// The interval of a time that only increases.
 pub(crate) struct Cursor<'a> {
     track: Track<'a>,
     interval: usize,

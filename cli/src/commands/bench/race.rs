@@ -6,7 +6,7 @@ use glam::Quat;
 
 use crate::commands::bench::report::BenchRow;
 
-/// The work of a contestant; returns times of parts of it.
+/// The work of a contestant; returns the times of its parts.
 type Action<'a, E> = Box<dyn FnMut(&mut [Quat]) -> Result<Vec<TimeShare>, E> + 'a>;
 
 /// How often each contestant is measured, and how many calls one measurement has.

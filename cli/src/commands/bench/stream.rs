@@ -1,4 +1,4 @@
-//! Results larger than memory: does evaluating hide behind writing?
+//! Results larger than memory: measures whether evaluation takes longer than writing.
 
 use std::fs::File;
 use std::io::{Seek, Write};
@@ -36,7 +36,7 @@ impl TemporaryFile {
         written.map_err(StreamError::Writing)
     }
 
-    /// Waits until all of it is on the disk, and forgets it.
+    /// Waits until the whole file is on the disk, and drops it from the cache.
     fn finish(&mut self) -> Result<(), StreamError> {
         let mut finish = || {
             self.0.sync_data()?;

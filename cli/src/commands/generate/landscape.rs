@@ -63,7 +63,7 @@ impl Landscape {
         Self { bumps, rocks, seed }
     }
 
-    /// How high the ground is, by polynomials alone: the same on every machine.
+    /// The height of the ground, by polynomials only, so that it is the same on every machine.
     fn height(&self, at: DVec2) -> f64 {
         let bump = |&(middle, radius, height): &(DVec2, f64, f64)| {
             let near = (1.0 - at.distance_squared(middle) / (radius * radius)).max(0.0);

@@ -41,10 +41,10 @@ struct BodySummary {
 struct JointSummary {
     name: String,
     kind: &'static str,
-    /// In the body's frame; of hinges and slides.
+    /// The axis in the body's frame, for hinges and slides.
     #[serde(skip_serializing_if = "Option::is_none")]
     axis: Option<[f64; 3]>,
-    /// Radians; of slides metres.
+    /// In radians; for slides in metres.
     #[serde(skip_serializing_if = "Option::is_none")]
     limits: Option<[f64; 2]>,
     /// The joint whose value determines that of this one, as `multiplier * value + offset`.

@@ -17,7 +17,7 @@ use crate::messages::exit::Failure;
 type Area<'a, DB> = DrawingArea<DB, Shift>;
 type Chart<'a, DB> = ChartContext<'a, DB, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
 
-/// The name that people's own fonts go by in SVG; in PNG it is `DejaVu` Sans.
+/// The font in SVG, which selects a font of the reader's system; in PNG it is `DejaVu` Sans.
 const FONT: &str = "sans-serif";
 /// Pixels of PNG for one of SVG.
 const PIXELS: u32 = 2;
@@ -464,7 +464,7 @@ mod tests {
         }
     }
 
-    /// Would catch a title that runs into the panel beside it, or out of the picture.
+    /// Catches a title that reaches into the next panel, or out of the picture.
     #[test]
     fn a_long_title_is_written_smaller_and_then_without_its_beginning() {
         plotters::style::register_font(FONT, FontStyle::Bold, dejavu::sans::bold())

@@ -192,7 +192,7 @@ pub(super) fn changing_scalars(clip: &Motion, name: &str) -> Vec<usize> {
     changing
 }
 
-/// Everything in one picture, if that can be read.
+/// Everything in one picture, if it stays readable.
 pub(super) fn together(
     subjects: &Subjects,
     methods: usize,

@@ -21,7 +21,7 @@ pub(crate) struct ProofComparison {
     pub(crate) same_golden_table: bool,
     /// Rounds of random sets that both evaluated from the same seed; `None` where seeds differ.
     pub(crate) rounds_in_common: Option<u64>,
-    /// Whether the CPUs of both made the same bits of these.
+    /// Whether the CPUs of both computed the same bits for these rounds.
     pub(crate) same_random_bits: Option<bool>,
     pub(crate) figures: Vec<FigurePair>,
 }

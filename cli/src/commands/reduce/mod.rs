@@ -309,8 +309,8 @@ impl Arguments {
         Ok((sparse, all))
     }
 
-    /// Writes clips as new files with few keys and with all of few bits; gives those of which the file
-    /// is smaller.
+    /// Writes clips as new files, with few keys and with all keys of few bits; returns the clips whose
+    /// file is smaller.
     fn smaller(
         &self,
         engine: &Engine,

@@ -10,12 +10,13 @@ use tumble_formats::motion::Motion;
 use crate::commands::render::solids::{Face, SIDES};
 use crate::messages::colours::{BOXES, Colour};
 
-/// How far a bone is broad, of its length; and where, from the parent to the joint.
+/// The width of a bone relative to its length, and where on the bone it is, from the parent to the
+/// joint.
 const BREADTH: f32 = 0.18;
 const BROADEST: f32 = 0.15;
-/// The edge of a root's cube, of the middle one of all bones' lengths.
+/// The edge of a root's cube, relative to the median length of the bones.
 const CUBE: f32 = 0.2;
-/// The middle length where no bone has any, of the extent of the motion.
+/// The length of bones if all have the length 0, relative to the extent of the motion.
 const LONE_LENGTH: f32 = 0.15;
 /// The colour of the meshes of a file.
 const SKIN: Colour = [0xc9, 0xb8, 0xa4];
@@ -28,7 +29,7 @@ pub(crate) struct Bones {
     tips: Vec<(usize, Vec3)>,
     /// For each joint, the axis of its parent that turns the bone about itself.
     across: Vec<Vec3>,
-    /// A length to judge distances by.
+    /// A length to which distances are compared.
     pub(crate) length: f32,
 }
 
@@ -232,7 +233,7 @@ mod tests {
         assert!(bone([from, from], Vec3::X, BOXES[0]).is_empty());
     }
 
-    /// Joints of one parent start where it is: a body is no chain.
+    /// The bones of several joints with one parent start at the parent: a body is not a chain.
     #[test]
     fn bones_go_by_parents() {
         let mut clip = Motion::default();

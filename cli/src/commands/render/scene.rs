@@ -66,9 +66,9 @@ pub(crate) struct Actor {
     /// `[frame][track]`.
     pub(crate) positions: Vec<Vec3>,
     pub(crate) shape: Shape,
-    /// The curves that bodies go along, which cast shadows on the floor.
+    /// The curves that bodies follow, which cast shadows on the floor.
     pub(crate) trails: Vec<Face>,
-    /// Where the camera looks, and nothing may be left out.
+    /// The points that must be visible; the camera looks at their middle.
     pub(crate) reach: Vec<Vec3>,
 }
 
@@ -122,13 +122,13 @@ pub(crate) struct Style {
 /// Everything that is drawn, and the camera that sees all of it.
 pub(crate) struct Scene {
     actors: Vec<Actor>,
-    /// How far each is moved aside.
+    /// How far each actor is moved aside.
     shifts: Vec<Vec3>,
     style: Style,
     camera: Camera,
     /// The height of the floor that shadows fall on.
     shadowed: Option<f32>,
-    /// Ground and floor, and all that never moves, which every frame begins with.
+    /// Ground and floor, and everything that never moves; every frame begins with them.
     colour: Buffer2d<Colour>,
     depth: Buffer2d<f32>,
     labels: overlay::Labels,

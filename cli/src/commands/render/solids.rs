@@ -6,7 +6,7 @@ use tumble_routes::mesh::Mesh;
 use crate::commands::travel::Travel;
 use crate::messages::colours::{AXES, BOXES, Colour};
 
-/// The sun stands there.
+/// The direction of the sun.
 pub(crate) const SUN: Vec3 = Vec3::new(0.371_390_68, 0.742_781_35, 0.557_086);
 
 /// A triangle, counterclockwise seen from the side that its normal shows.
@@ -77,7 +77,7 @@ pub(crate) const SIDES: [([Vec3; 4], Vec3); 6] = {
 pub(crate) struct Body {
     centre: Vec3,
     half: Vec3,
-    /// From the box's axes to those that rotations apply to.
+    /// The rotation from the box's axes to the axes that rotations apply to.
     rotation: Quat,
     /// Whether its top and bottom are distinguished: a light roof, a dark floor.
     is_marked: bool,
@@ -230,7 +230,7 @@ mod tests {
         }
     }
 
-    /// Where a box is drawn, and which way up.
+    /// The position of a box in the picture, and its upward direction.
     #[test]
     fn a_body_goes_along_z_and_stands_on_its_path() {
         let body = Body::going(2.0, true, Quat::IDENTITY);

@@ -18,7 +18,7 @@ pub(crate) struct Participants {
     pub(super) pairs: Vec<[DVec3; 2]>,
     /// Their names in messages and files.
     pub(super) names: Vec<String>,
-    /// How each walks, where time counts.
+    /// The speed and the start time of each walker, if routes depend on time.
     pub(super) paces: Option<Vec<WalkingPace>>,
     /// Moving obstacles, each on its track.
     pub(super) movers: Vec<Mover>,
@@ -60,7 +60,7 @@ fn text(path: &Path, bytes: Vec<u8>) -> Result<String, Failure> {
     text.map_err(|_| whole(path, Code::Encoding, "is not UTF-8 text; save it as UTF-8"))
 }
 
-/// All bytes of a file; no pipe, which could have no end.
+/// All bytes of a file; pipes are refused, because they may be endless.
 fn bytes(path: &Path) -> Result<Vec<u8>, Failure> {
     let open = || match std::fs::metadata(path)?.is_file() {
         true => File::open(path),

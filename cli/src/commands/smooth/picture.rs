@@ -21,7 +21,7 @@ const COLUMNS: usize = 2000;
 /// The data of the picture: the rotations of one clip before and after smoothing.
 pub(super) struct SmoothingSubject<'a> {
     pub(super) title: String,
-    /// The kernel and how often.
+    /// The kernel, and how often it is applied.
     pub(super) about: String,
     /// The names of the joints.
     pub(super) names: &'a [String],

@@ -1,4 +1,5 @@
-//! GIF: 255 colours for the whole film, and one that lets the frame before it be seen.
+//! GIF: 255 colours for the whole film, and a transparent one, through which the frame before is
+//! visible.
 
 use std::io::{self, Write};
 

@@ -5,7 +5,7 @@ use std::io;
 use crate::commands::picture;
 use crate::messages::colours::Colour;
 
-/// Letters over a picture: how much of their colour each pixel has.
+/// Letters over a picture: the coverage of each pixel by letters.
 pub(crate) struct Labels {
     cover: Vec<u8>,
     ink: Colour,
