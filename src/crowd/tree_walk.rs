@@ -125,24 +125,3 @@ fn walk_to(frame: &TreeFrame, parent: &WalkedFrame, tracks: &[Joint<f32>], moves
         from_root,
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// All angles that a hinge may have, in every quarter turn.
-    #[test]
-    fn rotations_by_large_angles_are_as_accurate_as_those_by_small_ones() {
-        let mut worst = 0.0f64;
-        for step in -400_000..=400_000 {
-            let angle = 4096.0 * (step as f32 / 400_000.0);
-            let [x, y, z, w] = turned([0.0, 1.0, 0.0], angle);
-            let (sine, cosine) = (0.5 * f64::from(angle)).sin_cos();
-            worst = worst.max((f64::from(y) - sine).abs());
-            worst = worst.max((f64::from(w) - cosine).abs());
-            assert_eq!([x, z], [0.0; 2]);
-        }
-        assert!(worst < 1.2e-7, "{worst}");
-        assert_eq!(turned([1.0, 0.0, 0.0], 0.0), [0.0, 0.0, 0.0, 1.0]);
-    }
-}

@@ -194,6 +194,22 @@ fn every_function_that_is_written_for_the_cpu_is_compared() {
     assert!(missing.is_empty(), "{missing:?}");
 }
 
+/// All angles that a hinge may have, in every quarter turn.
+#[test]
+fn rotations_by_many_turns_are_as_accurate_as_those_by_small_angles() {
+    let mut worst = 0.0f64;
+    for step in -400_000..=400_000 {
+        let angle = 4096.0 * (step as f32 / 400_000.0);
+        let [x, y, z, w] = cpu::turned([0.0, 1.0, 0.0], angle);
+        let (sine, cosine) = (0.5 * f64::from(angle)).sin_cos();
+        worst = worst.max((f64::from(y) - sine).abs());
+        worst = worst.max((f64::from(w) - cosine).abs());
+        assert_eq!([x, z], [0.0; 2]);
+    }
+    assert!(worst < 1.2e-7, "{worst}");
+    assert_eq!(cpu::turned([1.0, 0.0, 0.0], 0.0), [0.0, 0.0, 0.0, 1.0]);
+}
+
 // ---------------------------------------------------------------- arguments
 
 /// An angle, or a number that is none.
@@ -204,6 +220,12 @@ fn angle(random: &mut Random) -> f32 {
     } else {
         number
     }
+}
+
+/// An angle of a hinge, which may be many turns.
+fn hinge_angle(random: &mut Random) -> f32 {
+    let size = if random.once_in(2) { 2.0 } else { 8192.0 };
+    size * random.number()
 }
 
 fn two(random: &mut Random) -> ([f32; 4], [f32; 4]) {
@@ -378,6 +400,8 @@ functions! { on, r:
     "composed" of (small(r), small(r)) => |(a, b)|
         { let r = entries::composed(on, a, b); [r.vector[0], r.vector[1], r.vector[2], r.cosm1] },
         { let r = cpu::composed(a, b); [r.vector[0], r.vector[1], r.vector[2], r.cosm1] };
+    "turned" of (r.vector::<3>(), hinge_angle(r)) => |(axis, angle)|
+        entries::turned(on, axis, angle), cpu::turned(axis, angle);
     "inverse_rotated" of (r.vector::<3>(), small(r)) => |(v, r)|
         entries::inverse_rotated(on, v, r), cpu::inverse_rotated(v, r);
     "canonical_product" of (r.vector::<4>(), r.vector::<3>(), r.number()) => |(m, v, w)|
