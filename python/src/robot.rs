@@ -14,7 +14,7 @@ use tumble::trees::{
 use tumble::{Quantity, TrackSet};
 use tumble_formats::motion::Motion;
 use tumble_formats::robot::{
-    self, BodiesError, BodiesRequest, LimitExcess, LimitRule, VelocityPoint, VelocitySource,
+    self, BodiesError, BodiesRequest, FixedBodies, LimitExcess, LimitRule, VelocityPoint, VelocitySource,
     unwrap_joint,
 };
 
@@ -46,11 +46,13 @@ use crate::run::{interruptible, work};
 pub(crate) struct Robot {
     robot: robot::Robot,
     path: PathBuf,
+    fixed_bodies: FixedBodies,
 }
 
 #[pymethods]
 impl Robot {
-    /// Reads a robot from an MJCF or URDF file.
+    /// Reads a robot from an MJCF or URDF file. `fixed_bodies`: "merge" makes bodies without joints parts of the bodies
+    /// that they are fixed to, as simulators do with URDF; "keep" keeps them.
     ///
     /// >>> import pathlib, tempfile, tumble
     /// >>> path = pathlib.Path(tempfile.mkdtemp(), "arm.xml")
@@ -60,15 +62,26 @@ impl Robot {
     /// >>> robot
     /// Robot("", 2 bodies, 1 joint)
     #[classmethod]
-    fn load(class: &Bound<'_, PyType>, path: PathBuf) -> PyResult<Self> {
+    #[pyo3(signature = (path, fixed_bodies="keep"))]
+    fn load(class: &Bound<'_, PyType>, path: PathBuf, fixed_bodies: &str) -> PyResult<Self> {
         let py = class.py();
+        let rule = PyString::new(py, fixed_bodies);
+        let fixed_bodies = option_of(rule.as_any(), "fixed_bodies")?;
         let path = std::path::absolute(path)?;
         let read = path.clone();
         let robot = interruptible(py, move || {
             robot::Robot::open(&read).map_err(|fault| of_diagnostic(&fault))
         })?;
         warn(py, &robot.warnings)?;
-        Ok(Self { robot, path })
+        let robot = match fixed_bodies {
+            FixedBodies::Keep => robot,
+            FixedBodies::Merge => robot.merged().map_err(|error| input(error.to_string()))?,
+        };
+        Ok(Self {
+            robot,
+            path,
+            fixed_bodies,
+        })
     }
 
     /// Its name; empty if the file has none.
@@ -211,9 +224,12 @@ impl Robot {
         Ok(result)
     }
 
-    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, (PathBuf,))> {
+    fn __reduce__<'py>(
+        slf: &Bound<'py, Self>,
+    ) -> PyResult<(Bound<'py, PyAny>, (PathBuf, &'static str))> {
         let load = slf.as_any().get_type().getattr("load")?;
-        Ok((load, (slf.get().path.clone(),)))
+        let robot = slf.get();
+        Ok((load, (robot.path.clone(), robot.fixed_bodies.name())))
     }
 
     fn __repr__(&self) -> String {
@@ -597,11 +613,17 @@ impl JointKeys<'_, '_> {
             return Ok(set);
         }
         let mut free = tree.joints().filter(|joint| joint.kind == JointKind::Free);
-        let (Some(joint), None) = (free.next(), free.next()) else {
-            return Err(input(format!(
-                "root_pos and root_quat are of a robot with one free joint; this one has {}",
-                tree.counts().free
-            )));
+        let rest = tree.rest();
+        let (root, at_rest) = match (free.next(), free.next(), tree.bodies().first()) {
+            (Some(joint), None, _) => (&*joint.name, rest.free[0]),
+            // The first body moves the base, as in `forward`.
+            (None, _, Some(body)) => (&*body.name, rest.base),
+            _ => {
+                return Err(input(format!(
+                    "root_pos and root_quat are of one root; this robot has {} free joints",
+                    tree.counts().free
+                )));
+            }
         };
         let keys = match rotations {
             Some(ArrayValues { shape, values }) if *shape == [count] => values,
@@ -611,9 +633,9 @@ impl JointKeys<'_, '_> {
                     "root_quat: its shape is {found}; give ({count}, 4)"
                 )));
             }
-            None => vec![tree.rest().free[0].rotation.as_quat(); count],
+            None => vec![at_rest.rotation.as_quat(); count],
         };
-        set.push(&*joint.name, &times, &keys)
+        set.push(root, &times, &keys)
             .map_err(|error| of_track(&error))?;
         if let Some(positions) = &positions {
             let points = positions.values.as_chunks::<3>().0.iter();

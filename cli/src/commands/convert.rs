@@ -244,6 +244,7 @@ impl Arguments {
             );
             return Err(Failure::usage(message));
         };
+        let robot = self.dialect.robot_of(dialect, &robot)?;
         let part = self.mirrored_part(work, clip)?;
         let times = part.key_times();
         let rate = part.rate.or_else(|| part.rate_of_keys());

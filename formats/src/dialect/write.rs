@@ -6,6 +6,7 @@
 mod arrays;
 mod columns;
 mod pickles;
+mod tensors;
 
 use std::io::Write;
 
@@ -25,7 +26,7 @@ pub struct WrittenDialect {
     pub name: &'static str,
     /// A short description.
     pub summary: &'static str,
-    /// The name of the format that holds it: `npz`, `csv` or `pickle`.
+    /// The name of the format that holds it: `npz`, `csv`, `pickle` or `torch`.
     pub format: &'static str,
     /// The order of its joints, and of its bodies if it has them.
     pub order: BodyOrder,
@@ -59,6 +60,7 @@ pub static WRITTEN: &[&WrittenDialect] = &[
     &pickles::GMR,
     &pickles::MOTION_LIB,
     &pickles::MIMICKIT,
+    &tensors::PROTOMOTIONS,
 ];
 
 /// The motion of a robot at samples of one rate.
@@ -75,7 +77,7 @@ pub struct RobotMotion<'a> {
     /// The rate of the samples.
     pub rate: FrameRate,
     /// The name of the clip.
-    pub name: Option<&'a str>,
+    pub name: &'a str,
     /// How the samples were made; `Some`: written beside the motion, with the names and orders of joints and bodies.
     pub description: Option<Vec<(&'static str, String)>>,
     /// The output's name in messages.
