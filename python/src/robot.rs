@@ -212,7 +212,7 @@ impl Robot {
         let width = bodies.len();
         let motions = work(py, count.saturating_mul(width), move || {
             let tree = &robot.get().robot.tree;
-            let at = |sample| arrays.at(tree, sample);
+            let at = |sample, state: &mut _| arrays.set(sample, state);
             robot::motions(tree, count, &bodies, &centres, at)
                 .map_err(|error| input(error.to_string()))
         })?;
@@ -354,8 +354,8 @@ impl ConfigurationArrays {
         rates.iter().any(|rate| rate.is_some())
     }
 
-    fn at(&self, tree: &Tree, sample: usize) -> (Configuration, ConfigurationRates) {
-        let (mut at, mut rates) = (tree.rest(), tree.no_rates());
+    /// Sets all values that there are of a sample.
+    fn set(&self, sample: usize, (at, rates): &mut (Configuration, ConfigurationRates)) {
         at.scalars.copy_from_slice(self.joint_pos.at(sample));
         if let Some(of) = &self.joint_vel {
             rates.scalars.copy_from_slice(of.at(sample));
@@ -370,13 +370,10 @@ impl ConfigurationArrays {
         for (pose, position) in poses.iter_mut().zip(vectors_of(&self.root_pos, sample)) {
             pose.position = position;
         }
-        let rotations = |of: &Option<JointArray>| -> Vec<DQuat> {
-            let of = of.as_ref();
-            of.map_or(Vec::new(), |of| {
-                of.rotations(sample, self.quaternions).collect()
-            })
-        };
-        for (pose, rotation) in poses.iter_mut().zip(rotations(&self.root_quat)) {
+        for (pose, rotation) in poses
+            .iter_mut()
+            .zip(self.rotations(&self.root_quat, sample))
+        {
             pose.rotation = rotation;
         }
         for (velocity, linear) in velocities
@@ -391,7 +388,11 @@ impl ConfigurationArrays {
         {
             velocity.angular = angular;
         }
-        for (ball, rotation) in at.balls.iter_mut().zip(rotations(&self.ball_quat)) {
+        for (ball, rotation) in at
+            .balls
+            .iter_mut()
+            .zip(self.rotations(&self.ball_quat, sample))
+        {
             *ball = rotation;
         }
         for (ball, rate) in rates
@@ -401,13 +402,33 @@ impl ConfigurationArrays {
         {
             *ball = rate;
         }
-        (at, rates)
+    }
+
+    fn rotations(
+        &self,
+        of: &Option<JointArray>,
+        sample: usize,
+    ) -> impl Iterator<Item = DQuat> {
+        let order = self.quaternions;
+        of.iter().flat_map(move |of| of.rotations(sample, order))
     }
 }
 
-fn vectors_of(of: &Option<JointArray>, sample: usize) -> Vec<DVec3> {
-    of.as_ref()
-        .map_or(Vec::new(), |of| of.vectors(sample).collect())
+fn vectors_of(of: &Option<JointArray>, sample: usize) -> impl Iterator<Item = DVec3> {
+    of.iter().flat_map(move |of| of.vectors(sample))
+}
+
+/// Some numbers of each body, in one list.
+fn numbers_of<T, const N: usize>(
+    motions: &[BodyMotion],
+    of: impl Fn(&BodyMotion) -> [f64; N],
+    number: impl Fn(f64) -> T,
+) -> Vec<T> {
+    let mut numbers = Vec::with_capacity(N * motions.len());
+    for motion in motions {
+        numbers.extend(of(motion).map(&number));
+    }
+    numbers
 }
 
 /// Sets the arrays of bodies in a result.
@@ -424,28 +445,15 @@ fn set_bodies<T: Element>(
         let shape = [shape, &[width]].concat();
         result.set_item(name, shaped(py, numbers, &shape)?)
     };
-    let vectors = |of: fn(&BodyMotion) -> DVec3| -> Vec<T> {
-        motions
-            .iter()
-            .flat_map(|motion| of(motion).to_array())
-            .map(&number)
-            .collect()
-    };
-    let rotations = motions.iter();
-    let rotations = rotations.flat_map(|motion| order.of_xyzw(motion.pose.rotation.to_array()));
-    set("body_pos_w", 3, vectors(|motion| motion.pose.position))?;
-    set("body_quat_w", 4, rotations.map(&number).collect())?;
+    let positions = |motion: &BodyMotion| motion.pose.position.to_array();
+    let rotations = |motion: &BodyMotion| order.of_xyzw(motion.pose.rotation.to_array());
+    set("body_pos_w", 3, numbers_of(motions, positions, &number))?;
+    set("body_quat_w", 4, numbers_of(motions, rotations, &number))?;
     if moves {
-        set(
-            "body_lin_vel_w",
-            3,
-            vectors(|motion| motion.velocity.linear),
-        )?;
-        set(
-            "body_ang_vel_w",
-            3,
-            vectors(|motion| motion.velocity.angular),
-        )?;
+        let linear = |motion: &BodyMotion| motion.velocity.linear.to_array();
+        let angular = |motion: &BodyMotion| motion.velocity.angular.to_array();
+        set("body_lin_vel_w", 3, numbers_of(motions, linear, &number))?;
+        set("body_ang_vel_w", 3, numbers_of(motions, angular, &number))?;
     }
     Ok(())
 }

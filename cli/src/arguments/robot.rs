@@ -45,7 +45,7 @@ pub(crate) struct DialectArguments {
     #[arg(long, value_name = "ORDER", requires = "dialect", default_value_t, value_parser = siblings())]
     siblings: Siblings,
     /// Bodies without joints: merge them into the bodies that they are fixed to, or keep them
-    /// [default: as simulators do: merged for URDF, kept for MJCF]
+    /// [default: beyondmimic and isaaclab merge the links of URDF]
     #[arg(long, value_name = "RULE", requires = "dialect", value_parser = fixed_bodies())]
     fixed_bodies: Option<FixedBodies>,
     /// The point of a body whose velocity is written [default: that of the dialect]
@@ -244,8 +244,8 @@ impl DialectArguments {
         dialect: &WrittenDialect,
         robot: &'a Robot,
     ) -> Result<Cow<'a, Robot>, Failure> {
-        let rule = self.fixed_bodies.unwrap_or(FixedBodies::of(robot.format));
-        match rule {
+        let of_dialect = dialect.fixed_bodies(robot.format);
+        match self.fixed_bodies.unwrap_or(of_dialect) {
             FixedBodies::Merge if dialect.has_bodies => robot
                 .merged()
                 .map(Cow::Owned)

@@ -4,7 +4,7 @@ use glam::{DQuat, DVec3};
 use tumble::names;
 use tumble::trees::{Tree, TreeBody, TreeError};
 
-use crate::robot::{Robot, RobotFormat};
+use crate::robot::Robot;
 
 /// How bodies without joints are written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -19,18 +19,6 @@ names! {
     FixedBodies, "rule for bodies without joints",
     Keep => "keep",
     Merge => "merge",
-}
-
-impl FixedBodies {
-    /// The rule of simulators for a kind of file: `MuJoCo` and the importer of `IsaacLab` merge the links of URDF that
-    /// are fixed, and `MuJoCo` keeps the bodies of MJCF.
-    #[must_use]
-    pub fn of(format: RobotFormat) -> Self {
-        match format {
-            RobotFormat::Urdf => Self::Merge,
-            RobotFormat::Mjcf => Self::Keep,
-        }
-    }
 }
 
 /// A mass in kilograms and its centre in the frame of a body.

@@ -23,6 +23,7 @@ pub(super) static PROTOMOTIONS: WrittenDialect = WrittenDialect {
     has_bodies: true,
     names_joints: false,
     has_degrees: false,
+    merges_links: false,
     velocity_at: VelocityPoint::Origin,
     quaternions: Some(ComponentOrder::Xyzw),
     assumed_rate: None,
