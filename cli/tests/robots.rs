@@ -6,6 +6,9 @@ use std::fs;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
+use tumble_formats::ReadOptions;
+use tumble_formats::pickle::Contents;
+
 use crate::program::{Run, run, succeed};
 
 /// Two arms of two hinges each on a body that moves freely: depth first and breadth first differ.
@@ -122,6 +125,7 @@ fn every_dialect_is_read_back() {
         ("gmr", "pkl"),
         ("motion-lib", "pkl"),
         ("mimickit", "pkl"),
+        ("protomotions", "motion"),
     ] {
         let out = format!("{dialect}.{ending}");
         line(
@@ -148,6 +152,212 @@ fn every_dialect_is_read_back() {
             assert!(off <= allowed, "{dialect}, frame {row}: {off:e}");
         }
     }
+}
+
+/// The bytes of tensors begin where `torch.load` maps them, and its pickle names nothing but tensors of f32.
+#[test]
+fn files_of_protomotions_are_archives_of_torch() {
+    let folder = folder();
+    let folder = folder.path();
+    fs::create_dir(folder.join("takes")).unwrap();
+    fs::rename(folder.join("take.csv"), folder.join("takes/take.csv")).unwrap();
+    let eval = "eval takes -o out --robot robot.xml --dialect protomotions --fps 30 -m slerp";
+    line(folder, eval);
+    let path = folder.join("out/take.motion");
+    let mut archive = zip::ZipArchive::new(fs::File::open(&path).unwrap()).unwrap();
+    let mut members = Vec::new();
+    for index in 0..archive.len() {
+        let mut member = archive.by_index(index).unwrap();
+        assert_eq!(member.compression(), zip::CompressionMethod::Stored);
+        let name = member.name().unwrap().into_owned();
+        assert_eq!(member.data_start().unwrap() % 64, 0, "{name}");
+        let mut bytes = Vec::new();
+        member.read_to_end(&mut bytes).unwrap();
+        members.push((name, bytes));
+    }
+    let names: Vec<&str> = members.iter().map(|(name, _)| &**name).collect();
+    let mut expected = vec!["archive/data.pkl", "archive/byteorder"];
+    let data = [
+        "archive/data/0",
+        "archive/data/1",
+        "archive/data/2",
+        "archive/data/3",
+        "archive/data/4",
+        "archive/data/5",
+    ];
+    expected.extend(data);
+    expected.push("archive/version");
+    assert_eq!(names, expected);
+    assert_eq!(
+        (&*members[1].1, &*members[8].1),
+        (&b"little"[..], &b"3\n"[..])
+    );
+    let pickle = String::from_utf8_lossy(&members[0].1);
+    assert!(members[0].1.starts_with(b"\x80\x02}("));
+    assert_eq!(
+        pickle
+            .matches("ctorch._utils\n_rebuild_tensor_v2\n")
+            .count(),
+        6
+    );
+    assert_eq!(pickle.matches("ctorch\nFloatStorage\n").count(), 6);
+    // Of rotations: 31 frames, 5 bodies, four numbers, the last one nearest in memory.
+    let int = |number: i32| [&b"J"[..], &number.to_le_bytes()].concat();
+    let lengths = |numbers: &[i32]| {
+        let all: Vec<u8> = numbers.iter().flat_map(|&number| int(number)).collect();
+        [&b"("[..], &all, b"t"].concat()
+    };
+    let rotations = [
+        b"X\x03\0\0\0cpu".to_vec(),
+        int(31 * 5 * 4),
+        b"tQ".to_vec(),
+        int(0),
+        lengths(&[31, 5, 4]),
+        lengths(&[20, 4, 1]),
+        b"\x89ccollections\nOrderedDict\n)RtR".to_vec(),
+    ];
+    let (rotations, pickle) = (rotations.concat(), &members[0].1);
+    assert!(
+        pickle
+            .windows(rotations.len())
+            .any(|part| part == rotations)
+    );
+    let contents = Contents::open(&path, &ReadOptions::default()).unwrap();
+    let found = contents
+        .entries()
+        .into_iter()
+        .map(|entry| (entry.name, entry.kind));
+    let found: HashMap<String, String> = found.collect();
+    for (name, kind) in [
+        ("fps", "() i8"),
+        ("dof_pos", "(31, 4) f4"),
+        ("dof_vel", "(31, 4) f4"),
+        ("rigid_body_pos", "(31, 5, 3) f4"),
+        ("rigid_body_rot", "(31, 5, 4) f4"),
+        ("rigid_body_vel", "(31, 5, 3) f4"),
+        ("rigid_body_ang_vel", "(31, 5, 3) f4"),
+    ] {
+        assert_eq!(found.get(name).map(String::as_str), Some(kind), "{name}");
+    }
+    assert_eq!(found.len(), 7, "{found:?}");
+    // The numbers are those of mjlab's file, but for the order of quaternions.
+    let mjlab = eval.replace("protomotions", "mjlab").replace("out", "npz");
+    line(folder, &mjlab);
+    let mjlab = arrays(&folder.join("npz/take.npz"));
+    let stored = |name: &str| contents.numbers(name).unwrap().values;
+    assert_eq!(stored("dof_vel"), mjlab["joint_vel"]);
+    assert_eq!(stored("rigid_body_vel"), mjlab["body_lin_vel_w"]);
+    assert_eq!(stored("rigid_body_ang_vel"), mjlab["body_ang_vel_w"]);
+    let first = mjlab["body_quat_w"]
+        .chunks(4)
+        .flat_map(|q| [q[1], q[2], q[3], q[0]]);
+    assert_eq!(stored("rigid_body_rot"), first.collect::<Vec<f64>>());
+}
+
+/// Loaders look the clip of a motion library up by the name of its file, up to the first point.
+#[test]
+fn clips_of_libraries_have_the_name_of_their_file() {
+    let folder = folder();
+    let folder = folder.path();
+    let convert = "--robot robot.xml --dialect motion-lib -o";
+    let clip = |file: &str| {
+        let contents = Contents::open(&folder.join(file), &ReadOptions::default()).unwrap();
+        let name = contents.entries().remove(0).name;
+        name.split_once('.').unwrap().0.to_owned()
+    };
+    line(folder, &format!("convert take.csv {convert} walk01.v2.pkl"));
+    assert_eq!(clip("walk01.v2.pkl"), "walk01");
+    fs::create_dir(folder.join("takes")).unwrap();
+    fs::rename(folder.join("take.csv"), folder.join("takes/dance.csv")).unwrap();
+    line(folder, &format!("eval takes --fps 30 {convert} out"));
+    assert_eq!(clip("out/dance.pkl"), "dance");
+    // A name in the input is kept.
+    line(
+        folder,
+        &format!("convert walk01.v2.pkl {convert} again.pkl"),
+    );
+    assert_eq!(clip("again.pkl"), "walk01");
+}
+
+/// Links that are fixed: a sensor without mass, and a plate that carries the elbow.
+const LINKS: &str = r#"<robot name="arm">
+  <link name="base"><inertial><mass value="2"/></inertial></link>
+  <link name="sensor"/>
+  <joint name="sensor_mount" type="fixed"><parent link="base"/><child link="sensor"/><origin xyz="0 0 1"/></joint>
+  <link name="right"><inertial><origin xyz="0 0 0.1"/><mass value="1"/></inertial></link>
+  <joint name="right_joint" type="continuous"><parent link="base"/><child link="right"/><axis xyz="0 1 0"/></joint>
+  <link name="plate"><inertial><origin xyz="0.1 0 0"/><mass value="3"/></inertial></link>
+  <joint name="plate_mount" type="fixed"><parent link="right"/><child link="plate"/>
+    <origin xyz="0 0 0.5" rpy="0 0 1.5707963267948966"/></joint>
+  <link name="elbow"><inertial><mass value="1"/></inertial></link>
+  <joint name="elbow_joint" type="continuous"><parent link="plate"/><child link="elbow"/>
+    <origin xyz="0 0 1"/><axis xyz="0 1 0"/></joint>
+  <link name="left"><inertial><mass value="1"/></inertial></link>
+  <joint name="left_joint" type="continuous"><parent link="base"/><child link="left"/>
+    <origin xyz="0 2 0"/><axis xyz="0 1 0"/></joint>
+</robot>"#;
+
+/// `IsaacLab` merges links that are fixed: a level below them is a level higher, and centres of mass are those of all.
+#[test]
+fn fixed_links_are_merged_as_simulators_do() {
+    let folder = folder();
+    let folder = folder.path();
+    fs::write(folder.join("arm.urdf"), LINKS).unwrap();
+    // The root rests; the right joint turns at 2 rad/s, the elbow and the left one do not turn.
+    let rows = (0..11).map(|frame| {
+        let angle = 2.0 * f64::from(frame) / 30.0;
+        format!("0,0,0,0,0,0,1,{angle},0.3,-0.2")
+    });
+    fs::write(folder.join("take.csv"), rows.collect::<Vec<_>>().join("\n")).unwrap();
+    let eval = "eval take.csv --robot arm.urdf --fps 30 -m slerp --json --dialect";
+    let report = |words: &str| -> serde_json::Value {
+        let made = line(folder, &format!("{eval} {words}"));
+        serde_json::from_slice::<serde_json::Value>(&made.out).unwrap()[0]["robot"].clone()
+    };
+    let merged = report("beyondmimic -o merged.npz");
+    let bodies = serde_json::json!(["base", "right", "left", "elbow"]);
+    assert_eq!(merged["bodies"], bodies);
+    assert_eq!(
+        merged["merged_bodies"],
+        serde_json::json!(["sensor", "plate"])
+    );
+    let joints = serde_json::json!(["right_joint", "left_joint", "elbow_joint"]);
+    assert_eq!(merged["joints"], joints);
+    // The centre of mass of `right` and `plate` is at (0, 3 · 0.1, 0.1 + 3 · 0.5) / 4 = (0, 0.075, 0.4).
+    let found = arrays(&folder.join("merged.npz"));
+    let first = &found["body_lin_vel_w"][3..6];
+    assert!(
+        largest_difference(first, &[0.8, 0.0, 0.0]) < 1e-6,
+        "{first:?}"
+    );
+    let elbow = &found["body_pos_w"][9..12];
+    assert!(
+        largest_difference(elbow, &[0.0, 0.0, 1.5]) < 1e-6,
+        "{elbow:?}"
+    );
+    // A file of these bodies is read with the robot of all links, and its order is found.
+    line(
+        folder,
+        "convert merged.npz --robot arm.urdf --dialect unitree-csv -o back.csv",
+    );
+    let [found, expected] = ["back.csv", "take.csv"].map(|file| numbers(&folder.join(file)));
+    assert!(largest_difference(&found, &expected) < 1e-6);
+    // Kept links without mass have the velocity of their origin.
+    let kept = report("beyondmimic --fixed-bodies keep -o kept.npz");
+    let bodies = serde_json::json!(["base", "sensor", "right", "left", "plate", "elbow"]);
+    assert_eq!(kept["bodies"], bodies);
+    let velocities = &arrays(&folder.join("kept.npz"))["body_lin_vel_w"];
+    assert!(largest_difference(&velocities[6..9], &[0.2, 0.0, 0.0]) < 1e-6);
+    assert!(largest_difference(&velocities[12..15], &[1.0, 0.0, 0.0]) < 1e-6);
+    // mjlab's robots are MJCF, whose bodies stay.
+    let mjlab = report("mjlab -o mjlab.npz");
+    assert_eq!(mjlab["bodies"].as_array().map(Vec::len), Some(6));
+    assert!(mjlab.get("merged_bodies").is_none());
+    refused(
+        folder,
+        "convert take.csv --robot arm.urdf --dialect gmr --fixed-bodies merge -o x.pkl",
+        "--fixed-bodies has no effect on gmr",
+    );
 }
 
 /// In breadth-first order, each level of the tree comes before the next one, and joints are in the order of their

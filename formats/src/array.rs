@@ -42,8 +42,10 @@ pub(crate) enum Element {
     F64,
     /// Signed integers of 1, 2, 4 or 8 bytes.
     Signed(usize),
-    /// Unsigned integers of 1, 2, 4 or 8 bytes; truth values have one byte.
+    /// Unsigned integers of 1, 2, 4 or 8 bytes.
     Unsigned(usize),
+    /// Truth values of one byte.
+    Bool,
     /// Text with this number of UTF-32 characters.
     Unicode(usize),
     /// Text with this number of bytes.
@@ -60,6 +62,7 @@ impl Element {
     /// Bytes of an element, if known.
     pub(crate) fn size(&self) -> Option<usize> {
         match *self {
+            Self::Bool => Some(1),
             Self::F16 => Some(2),
             Self::F32 => Some(4),
             Self::F64 => Some(8),
@@ -86,6 +89,7 @@ impl fmt::Display for Element {
             Self::F64 => f.write_str("f8"),
             Self::Signed(size) => write!(f, "i{size}"),
             Self::Unsigned(size) => write!(f, "u{size}"),
+            Self::Bool => f.write_str("bool"),
             Self::Unicode(length) => write!(f, "U{length}"),
             Self::Bytes(length) => write!(f, "S{length}"),
             Self::Object => f.write_str("objects"),
@@ -209,6 +213,10 @@ impl ArrayHeader {
     /// `NumPy`.
     pub(crate) fn write(element: &Element, shape: &[usize]) -> Vec<u8> {
         let mark = if element.size() == Some(1) { '|' } else { '<' };
+        let element = match element {
+            Element::Bool => "b1".to_owned(),
+            other => other.to_string(),
+        };
         let shape = shape_text(shape);
         let mut text =
             format!("{{'descr': '{mark}{element}', 'fortran_order': False, 'shape': {shape}, }}");
@@ -339,7 +347,7 @@ pub(crate) fn element(descr: &str) -> Result<(Element, bool), String> {
         ('f', Ok(8)) => Element::F64,
         ('i', Ok(size @ (1 | 2 | 4 | 8))) => Element::Signed(size),
         ('u', Ok(size @ (1 | 2 | 4 | 8))) => Element::Unsigned(size),
-        ('b', Ok(1)) => Element::Unsigned(1),
+        ('b', Ok(1)) => Element::Bool,
         ('U', Ok(length)) => Element::Unicode(length),
         ('S' | 'a', Ok(length)) => Element::Bytes(length),
         ('O', _) => Element::Object,

@@ -96,6 +96,7 @@ pub static FORMATS: &[&Format] = &[
     &fbx::FORMAT,
     // Before NPZ: files of PyTorch are ZIP archives too.
     &pickle::format::FORMAT,
+    &pickle::format::TORCH,
     &npz::FORMAT,
     &npy::FORMAT,
     #[cfg(feature = "parquet")]

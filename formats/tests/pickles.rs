@@ -267,6 +267,37 @@ fn names_that_python_would_run_are_refused() {
     assert_eq!(contents.entries()[0].kind, "object of osx.system");
 }
 
+/// A dict with a class for missing values is a dict, and a class of a long module is named in full. Truth values, also
+/// those of `PyTorch`, have their type.
+#[test]
+fn dicts_with_defaults_are_dicts_and_classes_have_their_names() {
+    for class in ["list", "int", "unicode"] {
+        let call = format!("ccollections\ndefaultdict\n(c__builtin__\n{class}\ntRX\x01\0\0\0kG");
+        let file = [call.as_bytes(), &2.5f64.to_be_bytes(), b"s."].concat();
+        let contents = Contents::read("a", file, Limits::default()).unwrap();
+        let entries: Vec<(String, String)> = (contents.entries().into_iter())
+            .map(|entry| (entry.name, entry.kind))
+            .collect();
+        assert_eq!(entries, [("k".to_owned(), "() f8".to_owned())], "{class}");
+        assert_eq!(contents.numbers("k").unwrap().values, [2.5]);
+    }
+    let called = Contents::read(
+        "a",
+        b"c__builtin__\nint\n(S'1'\ntR.".to_vec(),
+        Limits::default(),
+    );
+    assert_eq!(called.err().unwrap().code, Code::PickleForm);
+    let class = "protomotions.simulator.base_simulator.simulator_state\nStateConversion";
+    let file = dict("state", format!("c{class}\n(S'common'\ntR").as_bytes());
+    let contents = Contents::read("a", file, Limits::default()).unwrap();
+    let named = "`state` of protomotions.simulator.base_simulator.simulator_state.StateConversion";
+    let warning = &contents.warnings[0];
+    assert!(warning.message.contains(named), "{warning}");
+    let contents = Contents::read("a", dict("on", b"\x88"), Limits::default()).unwrap();
+    assert_eq!(contents.entries()[0].kind, "() bool");
+    assert_eq!(contents.numbers("on").unwrap().values, [1.0]);
+}
+
 /// A value of a dict in a dict is named with a point, in `--map` too.
 #[test]
 fn nested_values_have_names_with_points() {

@@ -133,8 +133,13 @@ fn report_of<'py>(py: Python<'py>, report: &RetargetReport) -> PyResult<Bound<'p
     }
     found.set_item("ends", ends)?;
     found.set_item("below_ground", report.below_ground)?;
-    found.set_item("stood_along", report.stood_along.map(|axis| axis.to_array()))?;
-    let axes = report.rests_along.map(|axes| axes.map(|axis| axis.to_array()));
+    found.set_item(
+        "stood_along",
+        report.stood_along.map(|axis| axis.to_array()),
+    )?;
+    let axes = report
+        .rests_along
+        .map(|axes| axes.map(|axis| axis.to_array()));
     found.set_item("rests_along", axes)?;
     Ok(found)
 }

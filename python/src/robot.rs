@@ -14,8 +14,8 @@ use tumble::trees::{
 use tumble::{Quantity, TrackSet};
 use tumble_formats::motion::Motion;
 use tumble_formats::robot::{
-    self, BodiesError, BodiesRequest, LimitExcess, LimitRule, VelocityPoint, VelocitySource,
-    unwrap_joint,
+    self, BodiesError, BodiesRequest, FixedBodies, LimitExcess, LimitRule, VelocityPoint,
+    VelocitySource, unwrap_joint,
 };
 
 use crate::arrays::{ArrayValues, Order, doubles, quaternions};
@@ -46,11 +46,13 @@ use crate::run::{interruptible, work};
 pub(crate) struct Robot {
     robot: robot::Robot,
     path: PathBuf,
+    fixed_bodies: FixedBodies,
 }
 
 #[pymethods]
 impl Robot {
-    /// Reads a robot from an MJCF or URDF file.
+    /// Reads a robot from an MJCF or URDF file. `fixed_bodies`: "merge" makes bodies without joints parts of the bodies
+    /// that they are fixed to, as simulators do with URDF; "keep" keeps them.
     ///
     /// >>> import pathlib, tempfile, tumble
     /// >>> path = pathlib.Path(tempfile.mkdtemp(), "arm.xml")
@@ -60,15 +62,26 @@ impl Robot {
     /// >>> robot
     /// Robot("", 2 bodies, 1 joint)
     #[classmethod]
-    fn load(class: &Bound<'_, PyType>, path: PathBuf) -> PyResult<Self> {
+    #[pyo3(signature = (path, fixed_bodies="keep"))]
+    fn load(class: &Bound<'_, PyType>, path: PathBuf, fixed_bodies: &str) -> PyResult<Self> {
         let py = class.py();
+        let rule = PyString::new(py, fixed_bodies);
+        let fixed_bodies = option_of(rule.as_any(), "fixed_bodies")?;
         let path = std::path::absolute(path)?;
         let read = path.clone();
         let robot = interruptible(py, move || {
             robot::Robot::open(&read).map_err(|fault| of_diagnostic(&fault))
         })?;
         warn(py, &robot.warnings)?;
-        Ok(Self { robot, path })
+        let robot = match fixed_bodies {
+            FixedBodies::Keep => robot,
+            FixedBodies::Merge => robot.merged().map_err(|error| input(error.to_string()))?,
+        };
+        Ok(Self {
+            robot,
+            path,
+            fixed_bodies,
+        })
     }
 
     /// Its name; empty if the file has none.
@@ -199,7 +212,7 @@ impl Robot {
         let width = bodies.len();
         let motions = work(py, count.saturating_mul(width), move || {
             let tree = &robot.get().robot.tree;
-            let at = |sample| arrays.at(tree, sample);
+            let at = |sample, state: &mut _| arrays.set(sample, state);
             robot::motions(tree, count, &bodies, &centres, at)
                 .map_err(|error| input(error.to_string()))
         })?;
@@ -211,9 +224,12 @@ impl Robot {
         Ok(result)
     }
 
-    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, (PathBuf,))> {
+    fn __reduce__<'py>(
+        slf: &Bound<'py, Self>,
+    ) -> PyResult<(Bound<'py, PyAny>, (PathBuf, &'static str))> {
         let load = slf.as_any().get_type().getattr("load")?;
-        Ok((load, (slf.get().path.clone(),)))
+        let robot = slf.get();
+        Ok((load, (robot.path.clone(), robot.fixed_bodies.name())))
     }
 
     fn __repr__(&self) -> String {
@@ -343,8 +359,8 @@ impl ConfigurationArrays {
         rates.iter().any(|rate| rate.is_some())
     }
 
-    fn at(&self, tree: &Tree, sample: usize) -> (Configuration, ConfigurationRates) {
-        let (mut at, mut rates) = (tree.rest(), tree.no_rates());
+    /// Sets all values that there are of a sample.
+    fn set(&self, sample: usize, (at, rates): &mut (Configuration, ConfigurationRates)) {
         at.scalars.copy_from_slice(self.joint_pos.at(sample));
         if let Some(of) = &self.joint_vel {
             rates.scalars.copy_from_slice(of.at(sample));
@@ -359,13 +375,10 @@ impl ConfigurationArrays {
         for (pose, position) in poses.iter_mut().zip(vectors_of(&self.root_pos, sample)) {
             pose.position = position;
         }
-        let rotations = |of: &Option<JointArray>| -> Vec<DQuat> {
-            let of = of.as_ref();
-            of.map_or(Vec::new(), |of| {
-                of.rotations(sample, self.quaternions).collect()
-            })
-        };
-        for (pose, rotation) in poses.iter_mut().zip(rotations(&self.root_quat)) {
+        for (pose, rotation) in poses
+            .iter_mut()
+            .zip(self.rotations(&self.root_quat, sample))
+        {
             pose.rotation = rotation;
         }
         for (velocity, linear) in velocities
@@ -380,7 +393,11 @@ impl ConfigurationArrays {
         {
             velocity.angular = angular;
         }
-        for (ball, rotation) in at.balls.iter_mut().zip(rotations(&self.ball_quat)) {
+        for (ball, rotation) in at
+            .balls
+            .iter_mut()
+            .zip(self.rotations(&self.ball_quat, sample))
+        {
             *ball = rotation;
         }
         for (ball, rate) in rates
@@ -390,13 +407,29 @@ impl ConfigurationArrays {
         {
             *ball = rate;
         }
-        (at, rates)
+    }
+
+    fn rotations(&self, of: &Option<JointArray>, sample: usize) -> impl Iterator<Item = DQuat> {
+        let order = self.quaternions;
+        of.iter().flat_map(move |of| of.rotations(sample, order))
     }
 }
 
-fn vectors_of(of: &Option<JointArray>, sample: usize) -> Vec<DVec3> {
-    of.as_ref()
-        .map_or(Vec::new(), |of| of.vectors(sample).collect())
+fn vectors_of(of: &Option<JointArray>, sample: usize) -> impl Iterator<Item = DVec3> {
+    of.iter().flat_map(move |of| of.vectors(sample))
+}
+
+/// Some numbers of each body, in one list.
+fn numbers_of<T, const N: usize>(
+    motions: &[BodyMotion],
+    of: impl Fn(&BodyMotion) -> [f64; N],
+    number: impl Fn(f64) -> T,
+) -> Vec<T> {
+    let mut numbers = Vec::with_capacity(N * motions.len());
+    for motion in motions {
+        numbers.extend(of(motion).map(&number));
+    }
+    numbers
 }
 
 /// Sets the arrays of bodies in a result.
@@ -413,28 +446,15 @@ fn set_bodies<T: Element>(
         let shape = [shape, &[width]].concat();
         result.set_item(name, shaped(py, numbers, &shape)?)
     };
-    let vectors = |of: fn(&BodyMotion) -> DVec3| -> Vec<T> {
-        motions
-            .iter()
-            .flat_map(|motion| of(motion).to_array())
-            .map(&number)
-            .collect()
-    };
-    let rotations = motions.iter();
-    let rotations = rotations.flat_map(|motion| order.of_xyzw(motion.pose.rotation.to_array()));
-    set("body_pos_w", 3, vectors(|motion| motion.pose.position))?;
-    set("body_quat_w", 4, rotations.map(&number).collect())?;
+    let positions = |motion: &BodyMotion| motion.pose.position.to_array();
+    let rotations = |motion: &BodyMotion| order.of_xyzw(motion.pose.rotation.to_array());
+    set("body_pos_w", 3, numbers_of(motions, positions, &number))?;
+    set("body_quat_w", 4, numbers_of(motions, rotations, &number))?;
     if moves {
-        set(
-            "body_lin_vel_w",
-            3,
-            vectors(|motion| motion.velocity.linear),
-        )?;
-        set(
-            "body_ang_vel_w",
-            3,
-            vectors(|motion| motion.velocity.angular),
-        )?;
+        let linear = |motion: &BodyMotion| motion.velocity.linear.to_array();
+        let angular = |motion: &BodyMotion| motion.velocity.angular.to_array();
+        set("body_lin_vel_w", 3, numbers_of(motions, linear, &number))?;
+        set("body_ang_vel_w", 3, numbers_of(motions, angular, &number))?;
     }
     Ok(())
 }
@@ -602,11 +622,17 @@ impl JointKeys<'_, '_> {
             return Ok(set);
         }
         let mut free = tree.joints().filter(|joint| joint.kind == JointKind::Free);
-        let (Some(joint), None) = (free.next(), free.next()) else {
-            return Err(input(format!(
-                "root_pos and root_quat are of a robot with one free joint; this one has {}",
-                tree.counts().free
-            )));
+        let rest = tree.rest();
+        let (root, at_rest) = match (free.next(), free.next(), tree.bodies().first()) {
+            (Some(joint), None, _) => (&*joint.name, rest.free[0]),
+            // The first body moves the base, as in `forward`.
+            (None, _, Some(body)) => (&*body.name, rest.base),
+            _ => {
+                return Err(input(format!(
+                    "root_pos and root_quat are of one root; this robot has {} free joints",
+                    tree.counts().free
+                )));
+            }
         };
         let keys = match rotations {
             Some(ArrayValues { shape, values }) if *shape == [count] => values,
@@ -616,9 +642,9 @@ impl JointKeys<'_, '_> {
                     "root_quat: its shape is {found}; give ({count}, 4)"
                 )));
             }
-            None => vec![tree.rest().free[0].rotation.as_quat(); count],
+            None => vec![at_rest.rotation.as_quat(); count],
         };
-        set.push(&*joint.name, &times, &keys)
+        set.push(root, &times, &keys)
             .map_err(|error| of_track(&error))?;
         if let Some(positions) = &positions {
             let points = positions.values.as_chunks::<3>().0.iter();

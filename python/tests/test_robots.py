@@ -114,6 +114,34 @@ def test_bodies_are_those_of_mujoco(shared):
         np.testing.assert_allclose(np.abs(dots), 1.0, atol=1e-13)
 
 
+def test_robots_without_a_free_joint_move_with_their_root(tmp_path):
+    path = tmp_path / "arm.urdf"
+    path.write_text(
+        '<robot name="arm"><link name="base"><inertial><mass value="1"/></inertial></link>'
+        '<link name="hand"><inertial><mass value="1"/></inertial></link><link name="tip"><inertial><mass value="3"/></inertial></link>'
+        '<joint name="elbow" type="continuous"><parent link="base"/><child link="hand"/><origin xyz="0 0 1"/></joint>'
+        '<joint name="mount" type="fixed"><parent link="hand"/><child link="tip"/><origin xyz="0 0.4 0"/></joint></robot>'
+    )
+    robot = tumble.Robot.load(path)
+    half = np.sqrt(0.5)
+    joints, root = [[0.0], [0.5]], ([[1, 2, 3], [2, 2, 3]], [[half, half, 0, 0]] * 2)
+    found = tumble.Engine("cpu").bodies(robot, joints, *root, order="wxyz", source_fps=1, fps=1)
+    expected = robot.forward(joints, *root, order="wxyz")
+    np.testing.assert_allclose(found["body_pos_w"], expected["body_pos_w"], atol=1e-6)
+    # The root's quarter turn about x takes the hand from z to -y.
+    np.testing.assert_allclose(found["body_pos_w"][0, 1], [1, 1, 3], atol=1e-6)
+    np.testing.assert_allclose(found["body_lin_vel_w"][0, 0], [1, 0, 0], atol=1e-6)
+    still = tumble.Engine("cpu").bodies(robot, joints, root[0], order="wxyz", source_fps=1, fps=1)
+    np.testing.assert_allclose(still["body_pos_w"][:, 1], np.add(root[0], [0, 0, 1]), atol=1e-6)
+    merged = tumble.Robot.load(path, fixed_bodies="merge")
+    assert merged.body_names() == ["base", "hand"]
+    assert pickle.loads(pickle.dumps(merged)).body_names() == ["base", "hand"]
+    # About x, the common centre of mass is 0.3 m away from the elbow.
+    for of, body, velocity in [(robot, 2, 0.8), (merged, 1, 0.6)]:
+        moving = of.forward([0.0], order="wxyz", joint_vel=[2.0], velocity_at="mass")
+        np.testing.assert_allclose(moving["body_lin_vel_w"][body], [0, 0, velocity], atol=1e-15)
+
+
 def rotated(quaternion, vector):
     """MuJoCo's angular velocities are in the body's axes."""
     w, v = quaternion[0], quaternion[1:]

@@ -57,7 +57,12 @@ pub(super) fn walk(
 }
 
 #[inline(always)]
-fn walk_to(frame: &TreeFrame, parent: &WalkedFrame, tracks: &[Joint<f32>], moves: bool) -> WalkedFrame {
+fn walk_to(
+    frame: &TreeFrame,
+    parent: &WalkedFrame,
+    tracks: &[Joint<f32>],
+    moves: bool,
+) -> WalkedFrame {
     let above = parent.in_world.rotation;
     let axes = product(above, frame.rest);
     let mut arm = rotated(above, frame.offset);

@@ -8,9 +8,7 @@ use tumble::crowd::{
     StateArray,
 };
 use tumble::vulkan::VulkanError;
-use tumble::{
-    Device, Encoding, Engine, EngineOptions, MatrixOrder, Method, VectorMethod, method,
-};
+use tumble::{Device, Encoding, Engine, EngineOptions, MatrixOrder, Method, VectorMethod, method};
 
 type Tables = (MotionTables, Vec<[u32; 4]>, Vec<[f32; 4]>);
 
@@ -108,7 +106,10 @@ fn states_have_the_bits_of_the_cpu_in_every_form_of_clips() {
             for of_device in &motions {
                 let (found, ranges) = of_device.sample(&at, None, &arrays, encoding).unwrap();
                 for (expected, range) in expected.iter().zip(ranges) {
-                    assert!(found.bytes()[range] == **expected, "{encoding} {of_device:?}");
+                    assert!(
+                        found.bytes()[range] == **expected,
+                        "{encoding} {of_device:?}"
+                    );
                 }
             }
         }

@@ -1,5 +1,6 @@
 //! The options for the motion of robots: the layout of another program that results have, and its orders.
 
+use std::borrow::Cow;
 use std::f64::consts::TAU;
 
 use clap::Args;
@@ -12,7 +13,7 @@ use tumble_formats::format::Format;
 use tumble_formats::motion::Motion;
 use tumble_formats::quaternion::ComponentOrder;
 use tumble_formats::robot::{
-    Bodies, BodiesError, BodiesRequest, LimitExcess, LimitRule, Robot, VelocityPoint,
+    Bodies, BodiesError, BodiesRequest, FixedBodies, LimitExcess, LimitRule, Robot, VelocityPoint,
     VelocitySource, bodies, clamp_scalars, scalar_excesses,
 };
 use tumble_formats::sample::ChannelMethods;
@@ -24,7 +25,7 @@ use crate::arguments::results::ResultArguments;
 use crate::batch::pipeline::ClipWork;
 use crate::batch::target::WrittenFile;
 use crate::messages::exit::{ALL_INPUTS, Failure};
-use crate::messages::words;
+use crate::messages::{names, words};
 
 /// How the motion of a robot is written.
 #[derive(Debug, Clone, Args)]
@@ -43,6 +44,10 @@ pub(crate) struct DialectArguments {
     /// The order of bodies with the same parent
     #[arg(long, value_name = "ORDER", requires = "dialect", default_value_t, value_parser = siblings())]
     siblings: Siblings,
+    /// Bodies without joints: merge them into the bodies that they are fixed to, or keep them
+    /// [default: beyondmimic and isaaclab merge the links of URDF]
+    #[arg(long, value_name = "RULE", requires = "dialect", value_parser = fixed_bodies())]
+    fixed_bodies: Option<FixedBodies>,
     /// The point of a body whose velocity is written [default: that of the dialect]
     #[arg(long, value_name = "POINT", requires = "dialect", value_parser = velocity_at())]
     velocity_at: Option<VelocityPoint>,
@@ -73,6 +78,14 @@ fn siblings() -> impl TypedValueParser<Value = Siblings> {
         Siblings::JointName => "by the names of their joints, as pinocchio has them",
     };
     one_of(Siblings::ALL.map(|siblings| (siblings.name(), help(siblings), siblings)))
+}
+
+fn fixed_bodies() -> impl TypedValueParser<Value = FixedBodies> {
+    let help = |rule| match rule {
+        FixedBodies::Keep => "they are bodies of the result",
+        FixedBodies::Merge => "only bodies with joints are in the result",
+    };
+    one_of(FixedBodies::ALL.map(|rule| (rule.name(), help(rule), rule)))
 }
 
 fn velocity_at() -> impl TypedValueParser<Value = VelocityPoint> {
@@ -126,6 +139,9 @@ pub(crate) struct RobotReport {
     bodies: Option<Vec<String>>,
     #[serde(skip_serializing_if = "Option::is_none")]
     body_order: Option<&'static str>,
+    /// The bodies of the robot's file that are parts of others.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    merged_bodies: Vec<String>,
     siblings: &'static str,
     /// The order of quaternions; absent where the dialect has none.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -147,7 +163,7 @@ impl RobotReport {
         self.quaternion
     }
 
-    /// `13 joints depth-first, 15 bodies depth-first`.
+    /// `13 joints depth-first, 15 bodies depth-first, 2 fixed bodies merged into them`.
     pub(crate) fn text(&self) -> String {
         let joints = words::count(self.joints.len(), "joint");
         let joints = format!("{joints} {}", self.joint_order);
@@ -156,7 +172,13 @@ impl RobotReport {
             1 => format!(", 1 body {order}"),
             count => format!(", {count} bodies {order}"),
         });
-        format!("{}: {joints}{}", self.dialect, bodies.unwrap_or_default())
+        let merged = match self.merged_bodies.len() {
+            0 => String::new(),
+            1 => ", 1 fixed body merged into them".to_owned(),
+            count => format!(", {count} fixed bodies merged into them"),
+        };
+        let bodies = bodies.unwrap_or_default();
+        format!("{}: {joints}{bodies}{merged}", self.dialect)
     }
 }
 
@@ -194,6 +216,12 @@ impl DialectArguments {
                 dialect.name
             )));
         }
+        if self.fixed_bodies.is_some() && !dialect.has_bodies {
+            return Err(Failure::usage(format!(
+                "--fixed-bodies has no effect on {}, which has no bodies; leave it out",
+                dialect.name
+            )));
+        }
         if self.describe && !dialect.takes_descriptions {
             return Err(Failure::usage(format!(
                 "--describe has no effect on {}; leave it out",
@@ -207,6 +235,22 @@ impl DialectArguments {
                 "{} is {}, not {}; leave out --format",
                 dialect.name, dialect.format, asked.name
             ))),
+        }
+    }
+
+    /// The robot whose bodies a dialect has: that of the file, or without its fixed bodies.
+    pub(crate) fn robot_of<'a>(
+        &self,
+        dialect: &WrittenDialect,
+        robot: &'a Robot,
+    ) -> Result<Cow<'a, Robot>, Failure> {
+        let of_dialect = dialect.fixed_bodies(robot.format);
+        match self.fixed_bodies.unwrap_or(of_dialect) {
+            FixedBodies::Merge if dialect.has_bodies => robot
+                .merged()
+                .map(Cow::Owned)
+                .map_err(|error| Failure::new(ALL_INPUTS, format!("--robot: {error}"))),
+            _ => Ok(Cow::Borrowed(robot)),
         }
     }
 
@@ -346,19 +390,20 @@ impl DialectArguments {
         };
         let target = work.target.to_string();
         let joints = written_joints(tree, &tree.order(joint_order, self.siblings));
-        let names: Vec<String> = tree
+        let all: Vec<String> = tree
             .scalar_joints()
             .map(|joint| joint.name.clone())
             .collect();
         let report = RobotReport {
             dialect: dialect.name,
-            joints: joints.iter().map(|&joint| names[joint].clone()).collect(),
+            joints: joints.iter().map(|&joint| all[joint].clone()).collect(),
             joint_order: joint_order.name(),
             bodies: dialect.has_bodies.then(|| {
                 let name = |&body: &usize| tree.bodies()[body].name.clone();
                 bodies.order.iter().map(name).collect()
             }),
             body_order: dialect.has_bodies.then_some(order.name()),
+            merged_bodies: robot.merged.clone(),
             siblings: self.siblings.name(),
             quaternion: dialect.quaternions.map(ComponentOrder::name),
             velocities: self.velocities.name(),
@@ -377,13 +422,14 @@ impl DialectArguments {
             all.push(("tumble", made.join(" ")));
             all
         };
+        let file_name = name_of_file(work);
         let motion = RobotMotion {
             tree,
             bodies,
-            origins: names.iter().map(|name| origin(name)).collect(),
+            origins: all.iter().map(|name| origin(name)).collect(),
             joints,
             rate,
-            name: clip.name.as_deref(),
+            name: clip.name.as_deref().unwrap_or(&file_name),
             description: self.describe.then(description),
             output: &target,
         };
@@ -392,6 +438,18 @@ impl DialectArguments {
             .write_motion(|out| dialect.write(&motion, out))?;
         Ok((written, report))
     }
+}
+
+/// The name of a clip that has none: that of the result's file up to the first point, by which loaders look clips up, or
+/// of the input's if the result is on standard output.
+fn name_of_file(work: &ClipWork) -> String {
+    let file = match names::is_standard(work.target.path()) {
+        true => work.path(),
+        false => work.target.path(),
+    };
+    let stem = names::stem(file);
+    let first = stem.split('.').next().filter(|name| !name.is_empty());
+    first.map_or(stem.clone(), ToOwned::to_owned)
 }
 
 /// Returns an error of the engine as such, so that another device may take over; other errors stay in the result.

@@ -258,6 +258,7 @@ impl Arguments {
             );
             return Err(Failure::usage(message));
         };
+        let robot = self.dialect.robot_of(dialect, &robot)?;
         let (part, changed) = self.mirrored_part(work, clip)?;
         let changed = mirrored_text(std::slice::from_ref(&part), &[changed]);
         let times = part.key_times();

@@ -196,7 +196,7 @@ fn summarise(
         return Ok(());
     }
     let format = arguments.inputs.format(path);
-    if format.name == tumble_formats::pickle::format::FORMAT.name && path.is_file() {
+    if tumble_formats::pickle::is_pickle(format) && path.is_file() {
         let options = arguments.inputs.options()?;
         let refused = |error| arguments.inputs.refused(&error);
         let contents = PickleSummary::read(path, &options).map_err(refused)?;

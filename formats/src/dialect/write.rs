@@ -6,6 +6,7 @@
 mod arrays;
 mod columns;
 mod pickles;
+mod tensors;
 
 use std::io::Write;
 
@@ -16,7 +17,7 @@ use tumble::trees::{BodyOrder, JointKind, Tree, TreeJoint};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::format::{Format, WriteError};
 use crate::quaternion::ComponentOrder;
-use crate::robot::{Bodies, VelocityPoint, joints_of};
+use crate::robot::{Bodies, FixedBodies, RobotFormat, VelocityPoint, joints_of};
 
 /// A dialect that is written.
 #[derive(Debug)]
@@ -25,7 +26,7 @@ pub struct WrittenDialect {
     pub name: &'static str,
     /// A short description.
     pub summary: &'static str,
-    /// The name of the format that holds it: `npz`, `csv` or `pickle`.
+    /// The name of the format that holds it: `npz`, `csv`, `pickle` or `torch`.
     pub format: &'static str,
     /// The order of its joints, and of its bodies if it has them.
     pub order: BodyOrder,
@@ -35,6 +36,9 @@ pub struct WrittenDialect {
     pub names_joints: bool,
     /// Whether its numbers for joints are degrees. Slides have none.
     pub has_degrees: bool,
+    /// Whether its simulator merges the links of URDF that are fixed into those that they are fixed to. Bodies of MJCF
+    /// stay as they are.
+    pub merges_links: bool,
     /// The point of a body whose velocity it has.
     pub velocity_at: VelocityPoint,
     /// The order of a quaternion's components; `None` if it has none.
@@ -59,6 +63,7 @@ pub static WRITTEN: &[&WrittenDialect] = &[
     &pickles::GMR,
     &pickles::MOTION_LIB,
     &pickles::MIMICKIT,
+    &tensors::PROTOMOTIONS,
 ];
 
 /// The motion of a robot at samples of one rate.
@@ -75,7 +80,7 @@ pub struct RobotMotion<'a> {
     /// The rate of the samples.
     pub rate: FrameRate,
     /// The name of the clip.
-    pub name: Option<&'a str>,
+    pub name: &'a str,
     /// How the samples were made; `Some`: written beside the motion, with the names and orders of joints and bodies.
     pub description: Option<Vec<(&'static str, String)>>,
     /// The output's name in messages.
@@ -98,6 +103,15 @@ impl WrittenDialect {
     pub fn named(name: &str) -> Option<&'static Self> {
         let mut all = WRITTEN.iter().copied();
         all.find(|dialect| dialect.name.eq_ignore_ascii_case(name))
+    }
+
+    /// How its simulator has the bodies without joints of a file of this kind.
+    #[must_use]
+    pub fn fixed_bodies(&self, format: RobotFormat) -> FixedBodies {
+        match format {
+            RobotFormat::Urdf if self.merges_links => FixedBodies::Merge,
+            _ => FixedBodies::Keep,
+        }
     }
 
     /// How files in it end.

@@ -15,6 +15,8 @@ impl Format {
         match self.name {
             // Loaders of robots' motions look for `*.pkl`.
             "pickle" => "pkl",
+            // Those of ProtoMotions look for `*.motion`.
+            "torch" => "motion",
             name => name,
         }
     }
@@ -44,7 +46,7 @@ impl Format {
         if !path.extension()?.eq_ignore_ascii_case("gz") {
             return Self::of(path);
         }
-        Self::of(Path::new(path.file_stem()?)).filter(|format| format.name == pickle::NAME)
+        Self::of(Path::new(path.file_stem()?)).filter(|format| pickle::is_pickle(format))
     }
 
     /// The formats that can be written: first those that store results in parts, then those that store clips only.

@@ -61,7 +61,7 @@ pub fn body_offsets(path: &Path, clip: &Motion, limits: Limits) -> Result<Vec<f6
     let source = Source::open(&file, false)?;
     let name = source.name.clone();
     let bytes = source.into_bytes(limits.file)?;
-    let is_pickle = Format::detect(&file, &bytes).name == pickle::NAME;
+    let is_pickle = pickle::is_pickle(Format::detect(&file, &bytes));
     let archive = match is_pickle {
         true => pickle::Contents::read(&name, bytes, limits)?.into_parts().0,
         false => Archive::open(&name, bytes, limits)?,

@@ -26,6 +26,15 @@ pub(crate) struct ArchiveWriter {
     zip: ZipWriter<Cursor<Vec<u8>>>,
 }
 
+/// The options of a member of `length` bytes that is stored as it is.
+fn stored(length: usize) -> SimpleFileOptions {
+    // Members near 4 GiB get sizes of 64 bits. The limit is lower than 4 GiB, because deflating may make a member
+    // slightly longer.
+    SimpleFileOptions::default()
+        .compression_method(CompressionMethod::Stored)
+        .large_file(length >= 0xF000_0000)
+}
+
 /// Number of bytes that are added to the archive at once.
 const PIECE: usize = 1 << 16;
 
@@ -42,17 +51,22 @@ impl ArchiveWriter {
             true => CompressionMethod::Deflated,
             false => CompressionMethod::Stored,
         };
-        // Members near 4 GiB get sizes of 64 bits. The limit is lower than 4 GiB, because deflating may make a member
-        // slightly longer.
-        let options = SimpleFileOptions::default()
-            .compression_method(method)
-            .large_file(length >= 0xF000_0000);
+        let options = stored(length).compression_method(method);
         self.zip.start_file(path, options).map_err(io::Error::other)
     }
 
     /// Writes a member with these bytes.
     pub(super) fn bytes(&mut self, path: &str, bytes: &[u8], is_deflated: bool) -> io::Result<()> {
         self.begin(path, bytes.len(), is_deflated)?;
+        self.zip.write_all(bytes)
+    }
+
+    /// Writes a member whose bytes begin at a multiple of `alignment` bytes in the archive.
+    pub(crate) fn aligned(&mut self, path: &str, bytes: &[u8], alignment: u16) -> io::Result<()> {
+        let options = stored(bytes.len()).with_alignment(alignment);
+        self.zip
+            .start_file(path, options)
+            .map_err(io::Error::other)?;
         self.zip.write_all(bytes)
     }
 

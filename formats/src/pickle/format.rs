@@ -1,4 +1,4 @@
-//! The format of pickles: clips of the values that they hold.
+//! The formats of pickles: clips of the values that they hold.
 
 use std::path::Path;
 
@@ -9,15 +9,33 @@ use crate::format::{Format, FormatOption, Loaded, ReadOptions};
 use crate::npz;
 use crate::npz::archive::Archive;
 use crate::pickle::machine::torch;
-use crate::pickle::{Contents, NAME};
+use crate::pickle::{Contents, NAMES};
 
-/// The format of pickles.
+/// The format of pickles of Python and joblib.
 pub static FORMAT: Format = Format {
-    name: NAME,
-    summary: "a pickle of Python, joblib or PyTorch, read as data: nothing in it is run",
-    extensions: &["pkl", "p", "joblib", "pt", "pth", "motion", "ckpt"],
+    name: NAMES[0],
+    summary: "a pickle of Python or joblib, read as data: nothing in it is run",
+    extensions: &["pkl", "p", "joblib"],
     // Protocols 0 and 1, and compressed files, are known by their extension alone.
-    probe: |start| matches!(start, [0x80, 2..=5, ..]) || torch::is_archive(start),
+    probe: |start| matches!(start, [0x80, 2..=5, ..]),
+    ..PICKLES
+};
+
+/// The format of files of `torch.save`.
+pub static TORCH: Format = Format {
+    name: NAMES[1],
+    summary: "an archive of `torch.save`, read as data: nothing in it is run",
+    extensions: &["pt", "pth", "motion", "ckpt"],
+    probe: torch::is_archive,
+    ..PICKLES
+};
+
+/// What both formats have.
+const PICKLES: Format = Format {
+    name: "",
+    summary: "",
+    extensions: &[],
+    probe: |_| false,
     numbers_in_line: None,
     is_text: false,
     numbers_repeated_names: false,

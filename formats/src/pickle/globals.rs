@@ -26,6 +26,9 @@ pub(super) enum Global {
     Dtype,
     Encode,
     Dict,
+    DefaultDict,
+    /// A type of single values, which nothing may call.
+    Type(&'static str),
     Set,
     List,
     Tuple,
@@ -69,7 +72,8 @@ impl StorageKind {
             Self::Int => Element::Signed(4),
             Self::Short => Element::Signed(2),
             Self::Char => Element::Signed(1),
-            Self::Byte | Self::Bool => Element::Unsigned(1),
+            Self::Byte => Element::Unsigned(1),
+            Self::Bool => Element::Bool,
         })
     }
 
@@ -89,6 +93,7 @@ const KNOWN: &[(&[&str], &str, Global)] = &[
     (&["numpy"], "dtype", Global::Dtype),
     (&["_codecs"], "encode", Global::Encode),
     (&["collections"], "OrderedDict", Global::Dict),
+    (&["collections"], "defaultdict", Global::DefaultDict),
     (BUILTINS, "dict", Global::Dict),
     (BUILTINS, "set", Global::Set),
     (BUILTINS, "frozenset", Global::Set),
@@ -98,6 +103,12 @@ const KNOWN: &[(&[&str], &str, Global)] = &[
     // Protocols 0 to 2 store empty bytes in this way.
     (BUILTINS, "bytes", Global::ByteArray),
     (BUILTINS, "object", Global::Object),
+    // What a `defaultdict` calls for keys that it does not have.
+    (BUILTINS, "int", Global::Type("int")),
+    (BUILTINS, "float", Global::Type("float")),
+    (BUILTINS, "bool", Global::Type("bool")),
+    (BUILTINS, "str", Global::Type("str")),
+    (BUILTINS, "unicode", Global::Type("unicode")),
     (
         &["copy_reg", "copyreg"],
         "_reconstructor",
@@ -238,10 +249,17 @@ impl Class {
 
 impl std::fmt::Display for ClassName {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let name = format!("{}.{}", self.module, self.name);
-        f.write_str(&shown(&name))
+        // The name of the class says more than those of its modules.
+        let (module, name) = (self.module.as_str(), shown(&self.name));
+        match module.char_indices().rev().nth(LONGEST_MODULE) {
+            None => write!(f, "{module}.{name}"),
+            Some((at, first)) => write!(f, "…{}.{name}", &module[at + first.len_utf8()..]),
+        }
     }
 }
+
+/// How many characters of the name of a module messages have, the last ones.
+const LONGEST_MODULE: usize = 120;
 
 /// At most 60 characters of a text, for messages.
 pub(super) fn shown(text: &str) -> String {

@@ -530,7 +530,9 @@ impl<'a> Machine<'a> {
             (Global::List, []) => Node::List(Vec::new()),
             (Global::Tuple, []) => Node::Tuple(Vec::new()),
             (Global::Set, []) => Node::Set(Vec::new()),
-            (Global::Dict, []) => Node::Dict(Vec::new()),
+            (Global::Dict | Global::DefaultDict, [])
+            // The class of missing values is of no use here.
+            | (Global::DefaultDict, [_]) => Node::Dict(Vec::new()),
             (Global::List | Global::Tuple | Global::Set | Global::Size, [of]) => {
                 let items = self.items(*of);
                 let items = items.ok_or_else(|| self.damaged("a list is made of no items"))?;

@@ -16,7 +16,7 @@ use std::path::Path;
 use crate::array::{Element, NumberArray};
 use crate::budget::Budget;
 use crate::diagnostic::{Code, Diagnostic};
-use crate::format::ReadOptions;
+use crate::format::{Format, ReadOptions};
 use crate::limits::Limits;
 use crate::npz::archive::{Archive, Member};
 use crate::pickle::globals::shown;
@@ -26,8 +26,14 @@ use crate::pickle::values::{NamedValues, Values};
 use crate::source::Source;
 use crate::warnings::Warnings;
 
-/// The name of the format.
-pub(crate) const NAME: &str = "pickle";
+/// The names of the formats.
+const NAMES: [&str; 2] = ["pickle", "torch"];
+
+/// Whether files of a format are pickles.
+#[must_use]
+pub fn is_pickle(format: &Format) -> bool {
+    NAMES.contains(&format.name)
+}
 
 /// The values of a pickle.
 pub struct Contents {
@@ -75,7 +81,7 @@ impl Contents {
             let (bytes, budget) = archive.into_parts();
             return Self::of(file, "", bytes, pickle, budget, Some(&storages));
         }
-        torch::refuse_before_archives(file, &bytes)?;
+        torch::refuse_other_files(file, &bytes)?;
         let budget = Budget::of(bytes.len(), limits);
         let bytes = joblib::unpacked(file, bytes, limits, &budget)?;
         let all = 0..bytes.len();

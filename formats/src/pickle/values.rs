@@ -155,7 +155,7 @@ impl<'a> Values<'a> {
     /// A number or a text.
     fn single(&mut self, visit: Visit, node: &Node) -> Result<(), Diagnostic> {
         let (element, bytes): (Element, Cow<'_, [u8]>) = match node {
-            Node::Bool(truth) => (Element::Unsigned(1), vec![u8::from(*truth)].into()),
+            Node::Bool(truth) => (Element::Bool, vec![u8::from(*truth)].into()),
             Node::Int(number) => (Element::Signed(8), number.to_le_bytes().to_vec().into()),
             Node::Float(number) => (Element::F64, number.to_le_bytes().to_vec().into()),
             Node::Bytes(data) => {
@@ -206,7 +206,7 @@ impl<'a> Values<'a> {
         }
         let number = |&node: &NodeId| match value(node) {
             Some(&Node::Int(number)) => Some((Element::Signed(8), number, number as f64)),
-            Some(&Node::Bool(truth)) => Some((Element::Unsigned(1), truth.into(), truth.into())),
+            Some(&Node::Bool(truth)) => Some((Element::Bool, truth.into(), truth.into())),
             Some(&Node::Float(number)) => Some((Element::F64, 0, number)),
             Some(Node::Array(array)) => Some((Element::F64, 0, single_number(array, self.input)?)),
             _ => None,
@@ -225,7 +225,7 @@ impl<'a> Values<'a> {
         for (_, whole, float) in level.iter().filter_map(number) {
             match element {
                 Element::Signed(_) => bytes.extend(whole.to_le_bytes()),
-                Element::Unsigned(_) => bytes.push(whole as u8),
+                Element::Bool => bytes.push(whole as u8),
                 _ => bytes.extend(float.to_le_bytes()),
             }
         }

@@ -18,6 +18,7 @@ use crate::printable::printable;
 use crate::quaternion::ComponentOrder;
 use crate::robot::Robot;
 use crate::robot::bodies::unwrap_joint;
+use crate::robot::merge::kept_bodies;
 use crate::warnings::{Warnings, listed};
 
 /// The largest distance of a body from where its joints put it, in metres.
@@ -108,7 +109,7 @@ impl Robot {
         let tree = &self.tree;
         let scalars = scalars_of_robot(tree, clip, warnings, &refuse)?;
         let scalars = valued_scalars(tree, clip, scalars, warnings);
-        let candidate = choose(tree, clip, &scalars, order, warnings, &refuse)?;
+        let candidate = choose(self, clip, &scalars, order, warnings, &refuse)?;
         let mut motion = Motion {
             set: TrackSet::new(),
             ..clip.without_tracks()
@@ -421,13 +422,14 @@ pub(crate) fn joints_of(tree: &Tree, bodies: &[usize]) -> Vec<usize> {
 
 /// The joints of the scalars: by their names, or by the order that fits best.
 fn choose(
-    tree: &Tree,
+    robot: &Robot,
     clip: &Motion,
     scalars: &[(usize, ScalarKeys<'_>)],
     stated: Option<BodyOrder>,
     warnings: &mut Warnings,
     refuse: &impl Fn(String) -> Diagnostic,
 ) -> Result<Candidate, Diagnostic> {
+    let tree = &robot.tree;
     let names: Vec<&str> = scalars.iter().map(|(_, keys)| keys.name).collect();
     let recorded = clip.robot.as_ref().and_then(|robot| robot.bodies.as_ref());
     let is_numbered = names
@@ -467,12 +469,19 @@ fn choose(
             joints.join(", ")
         )));
     }
-    let with_joints = |&body: &usize| body == 0 || !tree.bodies()[body].joints.is_empty();
+    let merged = merged_bodies(robot, recorded);
     let mut candidates: Vec<Candidate> = Vec::new();
-    for &listed in &orders {
-        let all = tree.order(listed.0, listed.1);
+    for &ListedOrder(order, siblings) in &orders {
+        let listed = ListedOrder(order, siblings);
+        let all = match &merged {
+            None => tree.order(order, siblings),
+            Some((merged, kept)) => {
+                let all = merged.order(order, siblings).into_iter();
+                all.map(|body| kept[body]).collect()
+            }
+        };
         let joints = by_name.clone().unwrap_or_else(|| joints_of(tree, &all));
-        let bodies = bodies_of(tree, recorded, &all, with_joints);
+        let bodies = bodies_of(tree, recorded, &all);
         for quaternions in
             recorded.map_or(vec![ComponentOrder::Wxyz], |_| ComponentOrder::ALL.to_vec())
         {
@@ -642,13 +651,20 @@ fn joints_by_name(
     })
 }
 
-/// The body of each body of the file: by its name, or else in an order. Of fewer bodies they are those with joints, as
-/// programs have them that merge the others into their parents.
+/// The tree of a file that has as many bodies as the robot without those that have no joints, as programs have them that
+/// merge these into others; and the robot's body of each of its own.
+fn merged_bodies(robot: &Robot, recorded: Option<&RecordedBodies>) -> Option<(Tree, Vec<usize>)> {
+    let kept = kept_bodies(&robot.tree);
+    let is_merged = recorded?.count == kept.len() && kept.len() < robot.tree.bodies().len();
+    let merged = is_merged.then(|| robot.merged().ok()).flatten()?;
+    Some((merged.tree, kept))
+}
+
+/// The body of each body of the file: by its name, or else in an order.
 fn bodies_of(
     tree: &Tree,
     recorded: Option<&RecordedBodies>,
     order: &[usize],
-    with_joints: impl Fn(&usize) -> bool,
 ) -> Vec<Option<usize>> {
     let Some(recorded) = recorded else {
         return Vec::new();
@@ -657,10 +673,8 @@ fn bodies_of(
         let named = |name: &String| tree.bodies().iter().position(|body| body.name == *name);
         return recorded.names.iter().map(named).collect();
     }
-    let moving: Vec<usize> = order.iter().copied().filter(with_joints).collect();
     match recorded.count {
         count if count == order.len() => order.iter().copied().map(Some).collect(),
-        count if count == moving.len() => moving.into_iter().map(Some).collect(),
         count => vec![None; count],
     }
 }

@@ -239,7 +239,7 @@ pub fn bodies(
         (LimitRule::Clamp, Some(_)) => clamp(tree, &mut all),
         _ => {}
     }
-    let of_sample = |sample: usize| all[sample].clone();
+    let of_sample = |sample: usize, state: &mut _| *state = all[sample].clone();
     let motions = motions(tree, all.len(), &order, &centres, of_sample)?;
     let first = order.iter().position(|&body| body == 0);
     let rows = motions.chunks(order.len().max(1));
@@ -325,8 +325,8 @@ fn clamp(tree: &Tree, all: &mut [(Configuration, ConfigurationRates)]) {
     }
 }
 
-/// The bodies of configurations, in an order of bodies, one configuration after the other; `at` has each. With
-/// `centres` ([`mass_centres`]), linear velocities are those of these points.
+/// The bodies of configurations, in an order of bodies, one configuration after the other. `at` sets each, in a state that
+/// is that of [`Tree::rest`] or that of another configuration. With `centres` ([`mass_centres`]), linear velocities are those of these points.
 ///
 /// # Errors
 /// When a configuration has not one finite value for each joint.
@@ -335,22 +335,23 @@ pub fn motions(
     count: usize,
     order: &[usize],
     centres: &[DVec3],
-    at: impl Fn(usize) -> (Configuration, ConfigurationRates) + Sync,
+    at: impl Fn(usize, &mut (Configuration, ConfigurationRates)) + Sync,
 ) -> Result<Vec<BodyMotion>, TreeError> {
-    let one = |sample: usize| {
-        let (configuration, rates) = at(sample);
-        let all = tree.motions(&configuration, &rates)?;
-        let ordered = order.iter().map(|&body| {
-            let mut motion = all[body];
+    let mut all = vec![BodyMotion::default(); count.saturating_mul(order.len())];
+    let rows = all.par_chunks_mut(order.len().max(1)).enumerate();
+    let buffers = || ((tree.rest(), tree.no_rates()), Vec::new());
+    rows.try_for_each_init(buffers, |(state, bodies), (sample, row)| {
+        at(sample, state);
+        tree.motions_into(&state.0, &state.1, bodies)?;
+        for (motion, &body) in row.iter_mut().zip(order) {
+            *motion = bodies[body];
             if let Some(&centre) = centres.get(body) {
                 motion.velocity.linear = motion.velocity_at(centre);
             }
-            motion
-        });
-        Ok(ordered.collect::<Vec<_>>())
-    };
-    let all: Result<Vec<_>, TreeError> = (0..count).into_par_iter().map(one).collect();
-    Ok(all?.concat())
+        }
+        Ok(())
+    })?;
+    Ok(all)
 }
 
 /// The points of bodies whose velocities are asked for: centres of mass, in the order of [`Tree::bodies`], or none for

@@ -33,6 +33,7 @@ struct Reader<'a> {
     /// The attributes of joints of each class.
     classes: HashMap<&'a str, Attributes<'a>>,
     bodies: Vec<TreeBody>,
+    masses: Vec<Option<f64>>,
     joint_count: usize,
 }
 
@@ -61,7 +62,7 @@ pub(super) fn read(documents: &Documents<'_>) -> Result<Robot, Diagnostic> {
             "worldbody" => reader.world(element)?,
             "equality" => couplings += documents.tagged(element, "joint").count(),
             "compiler" if documents.attribute(element, "fusestatic") == Some("true") => {
-                let message = "`fusestatic` makes MuJoCo merge the bodies without joints into their parents; here they stay";
+                let message = "`fusestatic` makes MuJoCo merge the bodies without joints into their parents; here they stay (`--fixed-bodies merge` merges them)";
                 warnings.push(documents.refuse(element, Code::RobotMerged, message));
             }
             _ => {}
@@ -80,6 +81,8 @@ pub(super) fn read(documents: &Documents<'_>) -> Result<Robot, Diagnostic> {
             .to_owned(),
         format: RobotFormat::Mjcf,
         tree,
+        masses: reader.masses,
+        merged: Vec::new(),
         poses,
         couplings,
         warnings,
@@ -127,6 +130,7 @@ impl<'a> Reader<'a> {
             euler_sequence,
             has_automatic_limits,
             bodies: Vec::new(),
+            masses: Vec::new(),
             joint_count: 0,
         })
     }
@@ -204,6 +208,8 @@ impl<'a> Reader<'a> {
         let BodyPose { position, rotation } = self.placed(element, frame)?;
         let inertial = documents.tagged(element, "inertial").next();
         let mass_centre = inertial.map(|inertial| documents.vector(inertial, "pos"));
+        let mass = inertial.and_then(|inertial| documents.list::<1>(inertial, "mass").ok()?);
+        self.masses.push(mass.map(|[mass]| mass));
         self.bodies.push(TreeBody {
             name: match documents.attribute(element, "name") {
                 Some(name) => name.to_owned(),

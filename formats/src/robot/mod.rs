@@ -1,12 +1,12 @@
 //! Robots: kinematic trees in MJCF (`MuJoCo`) and URDF (ROS).
 //!
-//! [`Robot::open`] reads the bodies and joints of a file. Meshes, masses but their centres, sensors and actuators are
-//! not read, and no file but those that an MJCF includes is opened. The rules were compared with `MuJoCo` and pinocchio;
+//! [`Robot::open`] reads the bodies and joints of a file. Meshes, inertias, sensors and actuators are not read, and no file but those that an MJCF includes is opened. The rules were compared with `MuJoCo` and pinocchio;
 //! [docs/robots.md](https://github.com/tumble-rs/tumble/blob/main/docs/robots.md) has them.
 
 mod assign;
 mod bodies;
 mod library;
+mod merge;
 mod mjcf;
 mod urdf;
 mod xml;
@@ -22,6 +22,7 @@ pub use bodies::{
     bodies, clamp_scalars, mass_centres, motions, scalar_excesses, unwrap_angles, unwrap_joint,
 };
 pub use library::{LARGEST_ANGLE, RobotClipError, RobotTracks};
+pub use merge::FixedBodies;
 
 use crate::diagnostic::{Code, Diagnostic};
 use crate::limits::Limits;
@@ -36,6 +37,10 @@ pub struct Robot {
     pub format: RobotFormat,
     /// Its bodies and joints. The bodies are in the order of `MuJoCo`: depth first, children as in the file.
     pub tree: Tree,
+    /// The mass of each body in kilograms; `None` where the file does not say it.
+    pub masses: Vec<Option<f64>>,
+    /// The bodies of the file that are parts of others ([`Robot::merged`]).
+    pub merged: Vec<String>,
     /// The configurations that the file names, such as `home`.
     pub poses: Vec<(String, Configuration)>,
     /// How many relations between joints the file has that are not applied (`equality/joint` of MJCF), as `MuJoCo`'s

@@ -54,11 +54,13 @@ pub(super) fn read(documents: &Documents<'_>) -> Result<Robot, Diagnostic> {
         }
     };
     let mut bodies = Vec::with_capacity(links.len());
+    let mut masses = Vec::with_capacity(links.len());
     let mut waiting = vec![(top, None)];
     while let Some((link, parent)) = waiting.pop() {
         let body = body(documents, &links[link], parent)?;
         let index = bodies.len();
         bodies.push(body);
+        masses.push(mass(documents, links[link].element));
         let below = links[link].below.iter().rev();
         waiting.extend(below.map(|&(_, child)| (child, Some(index))));
     }
@@ -75,6 +77,8 @@ pub(super) fn read(documents: &Documents<'_>) -> Result<Robot, Diagnostic> {
             .to_owned(),
         format: RobotFormat::Urdf,
         tree,
+        masses,
+        merged: Vec::new(),
         poses: Vec::new(),
         couplings: 0,
         warnings: Vec::new(),
@@ -127,6 +131,16 @@ fn links<'a>(documents: &'a Documents<'_>) -> Result<Vec<Link<'a>>, Diagnostic> 
     Ok(links)
 }
 
+/// The mass of a link: 0 without `inertial`, as URDF defines it.
+fn mass(documents: &Documents<'_>, link: Element) -> Option<f64> {
+    let Some(inertial) = documents.tagged(link, "inertial").next() else {
+        return Some(0.0);
+    };
+    let mass = documents.tagged(inertial, "mass").next()?;
+    let [mass] = documents.list::<1>(mass, "value").ok()??;
+    Some(mass)
+}
+
 fn body(
     documents: &Documents<'_>,
     link: &Link<'_>,
@@ -138,6 +152,7 @@ fn body(
         Some(origin) => documents.vector(origin, "xyz"),
         None => Ok(DVec3::ZERO),
     });
+    let mass_centre = mass_centre.transpose()?;
     let origin = link.joint.and_then(|joint| child(joint, "origin"));
     let (position, rotation) = match origin {
         None => (DVec3::ZERO, DQuat::IDENTITY),
@@ -151,13 +166,16 @@ fn body(
         .joint
         .map(|joint| self::joint(documents, joint))
         .transpose()?;
+    // Without `inertial` a link has no mass. If it is fixed, simulators take its origin for its centre.
+    let is_fixed = joint.as_ref().is_some_and(Option::is_none);
+    let mass_centre = mass_centre.or(is_fixed.then_some(DVec3::ZERO));
     Ok(TreeBody {
         name: link.name.to_owned(),
         parent,
         position,
         rotation,
         joints: joint.flatten().into_iter().collect(),
-        mass_centre: mass_centre.transpose()?,
+        mass_centre,
     })
 }
 

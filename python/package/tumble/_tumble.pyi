@@ -2055,13 +2055,15 @@ class Surface:
 _BodyOrder: TypeAlias = Literal["depth-first", "breadth-first"]
 _Siblings: TypeAlias = Literal["file", "body-name", "joint-name"]
 _VelocityPoint: TypeAlias = Literal["origin", "mass"]
+_FixedBodies: TypeAlias = Literal["keep", "merge"]
 
 @final
 class Robot:
     """A robot: its bodies (links) and joints, from an MJCF or URDF file."""
     @classmethod
-    def load(cls, path: _Path) -> Robot:
-        """Reads a robot from an MJCF or URDF file."""
+    def load(cls, path: _Path, fixed_bodies: _FixedBodies = "keep") -> Robot:
+        """Reads a robot from an MJCF or URDF file. `fixed_bodies`: "merge" makes bodies without joints parts of the bodies
+        that they are fixed to, as simulators do with URDF; "keep" keeps them."""
     @property
     def name(self) -> str:
         """Its name; empty if the file has none."""

@@ -189,7 +189,8 @@ impl Engine {
     /// `body_lin_vel_w` and `body_ang_vel_w` (…, 3), in the world.
     ///
     /// `joint_pos`: (keys, joints), for `joint_names`, by default those of the robot. `root_pos`, `root_quat`: (keys,
-    /// 3) and (keys, 4), the pose of the free joint. Keys are at `source_fps`, or at `source_times` in seconds.
+    /// 3) and (keys, 4), the pose of the free joint, or of the first body of a robot without one. Keys are at
+    /// `source_fps`, or at `source_times` in seconds.
     /// `order`: "wxyz" or "xyzw", of keys and results; it has no default, because files differ. `body_order`,
     /// `siblings` and `velocity_at` are those of `Robot.forward`. Samples and `method` are those of `evaluate`.
     ///

@@ -50,7 +50,7 @@ pub struct BodyVelocity {
 }
 
 /// A body in the world, and its velocities in the world's axes.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct BodyMotion {
     /// Its pose.
     pub pose: BodyPose,
@@ -64,6 +64,12 @@ impl BodyPose {
         position: DVec3::ZERO,
         rotation: DQuat::IDENTITY,
     };
+}
+
+impl Default for BodyPose {
+    fn default() -> Self {
+        Self::IDENTITY
+    }
 }
 
 impl BodyMotion {
@@ -132,6 +138,16 @@ impl BodyMotion {
     pub(super) fn about(self, anchor: DVec3, rotation: DQuat, rate: DVec3) -> Self {
         let Self { pose, velocity } = self;
         let rotation = pose.rotation * rotation;
+        // Most joints turn about the origins of their bodies, which stay where they are.
+        if anchor == DVec3::ZERO {
+            return Self {
+                pose: BodyPose { rotation, ..pose },
+                velocity: BodyVelocity {
+                    angular: velocity.angular + rate,
+                    ..velocity
+                },
+            };
+        }
         let fixed = pose.position + pose.rotation * anchor;
         let position = fixed - rotation * anchor;
         let angular = velocity.angular + rate;

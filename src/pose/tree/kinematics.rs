@@ -23,6 +23,21 @@ impl Tree {
         configuration: &Configuration,
         rates: &ConfigurationRates,
     ) -> Result<Vec<BodyMotion>, TreeError> {
+        let mut motions = Vec::new();
+        self.motions_into(configuration, rates, &mut motions)?;
+        Ok(motions)
+    }
+
+    /// As [`Tree::motions`], into a list that is used again for each of many configurations. It is cleared first.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn motions_into(
+        &self,
+        configuration: &Configuration,
+        rates: &ConfigurationRates,
+        motions: &mut Vec<BodyMotion>,
+    ) -> Result<(), TreeError> {
         configuration.check(self)?;
         rates.check(self)?;
         let base = BodyMotion {
@@ -32,7 +47,8 @@ impl Tree {
             },
             velocity: rates.base,
         };
-        let mut motions: Vec<BodyMotion> = Vec::with_capacity(self.bodies.len());
+        motions.clear();
+        motions.reserve(self.bodies.len());
         let mut values = self.values.iter().copied();
         for body in &self.bodies {
             let parent = body.parent.map(|parent| motions[parent]);
@@ -58,6 +74,6 @@ impl Tree {
             moved.pose.rotation = moved.pose.rotation.normalize();
             motions.push(moved);
         }
-        Ok(motions)
+        Ok(())
     }
 }

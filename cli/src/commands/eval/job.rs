@@ -513,6 +513,7 @@ impl EvaluationJob<'_> {
         let Some(robot) = self.arguments.inputs.reading.robot()? else {
             return Err(Failure::usage("--dialect needs --robot"));
         };
+        let robot = self.arguments.dialect.robot_of(dialect, &robot)?;
         self.check_interpolation(name, clip)?;
         self.check_scale(name, clip, false)?;
         let clip = &*self.treated_keys(name, clip)?;

@@ -20,6 +20,7 @@ pub(super) static MJLAB: WrittenDialect = WrittenDialect {
     has_bodies: true,
     names_joints: false,
     has_degrees: false,
+    merges_links: false,
     velocity_at: VelocityPoint::Origin,
     quaternions: Some(ComponentOrder::Wxyz),
     assumed_rate: None,
@@ -32,14 +33,16 @@ pub(super) static BEYONDMIMIC: WrittenDialect = WrittenDialect {
     name: "beyondmimic",
     summary: "NPZ of BeyondMimic: as mjlab, breadth first, velocities of centres of mass",
     order: BodyOrder::BreadthFirst,
+    merges_links: true,
     velocity_at: VelocityPoint::Mass,
     ..MJLAB
 };
 
 pub(super) static ISAACLAB: WrittenDialect = WrittenDialect {
     name: "isaaclab",
-    summary: "NPZ of IsaacLab's AMP: joints and bodies with their names, w x y z",
+    summary: "NPZ of IsaacLab's AMP: joints and bodies with their names, w x y z, velocities of origins",
     order: BodyOrder::BreadthFirst,
+    merges_links: true,
     names_joints: true,
     has_whole_rate: false,
     takes_descriptions: false,

@@ -18,6 +18,7 @@ pub(super) static UNITREE: WrittenDialect = WrittenDialect {
     has_bodies: false,
     names_joints: false,
     has_degrees: false,
+    merges_links: false,
     velocity_at: VelocityPoint::Origin,
     quaternions: Some(ComponentOrder::Xyzw),
     assumed_rate: Some(30),

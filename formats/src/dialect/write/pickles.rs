@@ -22,6 +22,7 @@ pub(super) static GMR: WrittenDialect = WrittenDialect {
     has_bodies: false,
     names_joints: false,
     has_degrees: false,
+    merges_links: false,
     velocity_at: VelocityPoint::Origin,
     quaternions: Some(ComponentOrder::Xyzw),
     assumed_rate: None,
@@ -80,7 +81,7 @@ fn write_motion_lib(motion: &RobotMotion<'_>, out: &mut dyn Write) -> Result<(),
             .collect()
     });
     pickle.dict(|pickle| {
-        pickle.key(motion.name.unwrap_or("motion")).dict(|pickle| {
+        pickle.key(motion.name).dict(|pickle| {
             let shape = [samples, 3];
             pickle
                 .key("root_trans_offset")
@@ -143,7 +144,7 @@ impl RobotMotion<'_> {
 }
 
 /// A pickle that is being written.
-struct Pickle(Vec<u8>);
+pub(super) struct Pickle(Vec<u8>);
 
 /// Opcodes of protocol 2.
 mod op {
@@ -157,26 +158,33 @@ mod op {
     pub(super) const FALSE: u8 = 0x89;
     pub(super) const TRUE: u8 = 0x88;
     pub(super) const INT: u8 = b'J';
+    pub(super) const LONG: u8 = 0x8a;
     pub(super) const FLOAT: u8 = b'G';
     pub(super) const TEXT: u8 = b'X';
     pub(super) const TUPLE: u8 = b't';
+    pub(super) const EMPTY_TUPLE: u8 = b')';
     pub(super) const GLOBAL: u8 = b'c';
     pub(super) const REDUCE: u8 = b'R';
     pub(super) const BUILD: u8 = b'b';
+    pub(super) const PERSISTENT: u8 = b'Q';
     pub(super) const STOP: u8 = b'.';
 }
 
 impl Pickle {
-    fn new() -> Self {
+    pub(super) fn new() -> Self {
         Self(op::PROTO.to_vec())
     }
 
-    fn finish(mut self, out: &mut dyn Write) -> Result<(), WriteError> {
+    pub(super) fn into_bytes(mut self) -> Vec<u8> {
         self.0.push(op::STOP);
-        Ok(out.write_all(&self.0)?)
+        self.0
     }
 
-    fn dict(&mut self, entries: impl FnOnce(&mut Self)) {
+    fn finish(self, out: &mut dyn Write) -> Result<(), WriteError> {
+        Ok(out.write_all(&self.into_bytes())?)
+    }
+
+    pub(super) fn dict(&mut self, entries: impl FnOnce(&mut Self)) {
         self.0.extend([op::EMPTY_DICT, op::MARK]);
         entries(self);
         self.0.push(op::SETITEMS);
@@ -195,7 +203,7 @@ impl Pickle {
     }
 
     /// The key of the entry that follows.
-    fn key(&mut self, name: &str) -> &mut Self {
+    pub(super) fn key(&mut self, name: &str) -> &mut Self {
         self.text(name);
         self
     }
@@ -221,7 +229,7 @@ impl Pickle {
     }
 
     /// An `int` if it is one.
-    fn number(&mut self, number: f64) {
+    pub(super) fn number(&mut self, number: f64) {
         match number as i32 {
             int if f64::from(int) == number => self.int(int),
             _ => self.float(number),
@@ -231,6 +239,47 @@ impl Pickle {
     fn global(&mut self, module: &str, name: &str) {
         self.0.push(op::GLOBAL);
         self.0.extend(format!("{module}\n{name}\n").bytes());
+    }
+
+    /// A length, which may be larger than an `int`.
+    fn length(&mut self, length: usize) {
+        match i32::try_from(length) {
+            Ok(length) => self.int(length),
+            Err(_) => {
+                self.0.extend([op::LONG, 8]);
+                self.0.extend((length as u64).to_le_bytes());
+            }
+        }
+    }
+
+    fn lengths(&mut self, lengths: &[usize]) {
+        self.tuple(|pickle| lengths.iter().for_each(|&length| pickle.length(length)));
+    }
+
+    /// A tensor of `PyTorch` in C order, whose numbers are the file `key` of an archive.
+    pub(super) fn tensor(&mut self, key: &str, shape: &[usize]) {
+        let mut strides = vec![1; shape.len()];
+        for axis in (1..shape.len()).rev() {
+            strides[axis - 1] = strides[axis] * shape[axis];
+        }
+        self.global("torch._utils", "_rebuild_tensor_v2");
+        self.tuple(|pickle| {
+            pickle.tuple(|pickle| {
+                pickle.text("storage");
+                pickle.global("torch", "FloatStorage");
+                pickle.text(key);
+                pickle.text("cpu");
+                pickle.length(shape.iter().product());
+            });
+            pickle.0.push(op::PERSISTENT);
+            pickle.int(0);
+            pickle.lengths(shape);
+            pickle.lengths(&strides);
+            pickle.0.push(op::FALSE);
+            pickle.global("collections", "OrderedDict");
+            pickle.0.extend([op::EMPTY_TUPLE, op::REDUCE]);
+        });
+        self.0.push(op::REDUCE);
     }
 
     /// Bytes, which protocol 2 has as text of which `_codecs.encode` makes them.
@@ -254,7 +303,7 @@ impl Pickle {
         });
         self.0.extend([op::REDUCE, op::MARK]);
         self.int(1);
-        self.tuple(|pickle| shape.iter().for_each(|&length| pickle.int(length as i32)));
+        self.lengths(shape);
         self.global("numpy", "dtype");
         self.tuple(|pickle| {
             pickle.text(&String::from_utf8_lossy(element));

@@ -15,8 +15,8 @@ use crate::pickle::machine::{Data, Machine, Node, NodeId};
 /// How the name of the pickle in an archive ends.
 const PICKLE: &str = "/data.pkl";
 
-/// How a file of `PyTorch` before 1.6 begins: with a pickle of a number.
-const BEFORE_ARCHIVES: &[u8] = b"\x80\x02\x8a\x0al\xfc\x9cF\xf9 j\xa8P\x19.";
+/// How a file of `PyTorch` that is no archive begins: with a pickle of a number.
+const NO_ARCHIVE: &[u8] = b"\x80\x02\x8a\x0al\xfc\x9cF\xf9 j\xa8P\x19.";
 
 /// Whether a file that begins with these bytes is an archive of `torch.save`, whose first member is its pickle.
 pub(in crate::pickle) fn is_archive(start: &[u8]) -> bool {
@@ -28,15 +28,13 @@ pub(in crate::pickle) fn is_archive(start: &[u8]) -> bool {
     start.starts_with(b"PK\x03\x04") && name().is_some_and(|name| name.ends_with(PICKLE.as_bytes()))
 }
 
-/// Refuses a file of `PyTorch` before 1.6.
-pub(in crate::pickle) fn refuse_before_archives(
-    file: &str,
-    bytes: &[u8],
-) -> Result<(), Diagnostic> {
-    if !bytes.starts_with(BEFORE_ARCHIVES) {
+/// Refuses a file of `PyTorch` that is no archive.
+pub(in crate::pickle) fn refuse_other_files(file: &str, bytes: &[u8]) -> Result<(), Diagnostic> {
+    if !bytes.starts_with(NO_ARCHIVE) {
         return Ok(());
     }
-    let message = "the file is of PyTorch before 1.6; save it again: torch.save(torch.load(…), …)";
+    let message = "the file has the form of PyTorch before 1.6 (now `_use_new_zipfile_serialization=False`); save it again \
+                   as an archive: torch.save(torch.load(…), …)";
     Err(Diagnostic::new(file, Code::PickleForm, message))
 }
 
