@@ -80,6 +80,7 @@ mod _tumble {
     use crate::function::evaluate;
     #[pymodule_export]
     use crate::motions::frames::{joint_partners, reframe};
+    #[pymodule_export]
     use crate::motions::robots::{robot_motions, sample_bodies};
     #[pymodule_export]
     use crate::motions::scalars::scalar_motions;

@@ -591,7 +591,7 @@ impl Motions {
     /// The parent of each joint.
     #[getter]
     fn parents(&self) -> Vec<Option<usize>> {
-        self.tables.parents()
+        self.tables.motions().parents()
     }
 
     /// Fills arrays: rotations, positions, world rotations, velocities and angular velocities, each None

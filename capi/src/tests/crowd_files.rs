@@ -418,7 +418,7 @@ fn measure_tmp() {
                         let times: Vec<f64> = track.times.iter().step_by(step).copied().collect();
                         let quats: Vec<Quat> = track.keys.iter().step_by(step).copied().collect();
                         keys += times.len();
-                        set.push(track.name, &times, &quats).unwrap();
+                        set.push(track.name.unwrap_or_default(), &times, &quats).unwrap();
                     }
                     library.push(&set, method, VectorMethod::Linear).unwrap();
                 }
