@@ -921,7 +921,10 @@ fn a_directory_is_resumed_by_its_command() {
         ("eval a.dat b.dat -o out --to csv --resume", "out/a.csv"),
         ("eval a.dat b.dat -o out --to csv --resume -n", "out/a.csv"),
         ("eval a.dat b.dat -o out --to npy --resume", "out"),
-        ("eval a.dat b.dat -o out --to csv --resume --shard 1/1", "out/a.csv"),
+        (
+            "eval a.dat b.dat -o out --to csv --resume --shard 1/1",
+            "out/a.csv",
+        ),
     ] {
         let run = line(refused);
         assert_eq!(run.code, 2, "{refused}: {}", run.words);
@@ -933,11 +936,17 @@ fn a_directory_is_resumed_by_its_command() {
     assert_eq!(line(&format!("{convert} --resume")).code, 0);
     assert_eq!(line("check out").code, 0);
     // An input that failed has no options that name the command.
-    assert_eq!(line("convert a.dat bad.dat -o out --to csv --resume").code, 3);
+    assert_eq!(
+        line("convert a.dat bad.dat -o out --to csv --resume").code,
+        3
+    );
     let check = line("check out");
     let expected = "`tumble convert … --resume` tries them again";
     assert!(check.words.contains(expected), "{}", check.words);
-    assert_eq!(line("eval a.dat b.dat -o out --to csv --resume --overwrite").code, 0);
+    assert_eq!(
+        line("eval a.dat b.dat -o out --to csv --resume --overwrite").code,
+        0
+    );
 }
 
 /// Each fault has its line, with what mends it.
@@ -954,13 +963,17 @@ fn faults_that_are_found_have_a_line_each() {
     assert_eq!(lines.len(), 5, "{}", check.words);
     for (line, expected) in lines[1..].iter().zip([
         "error: 1 of 2 results changed; `tumble eval … --resume` makes them again",
-        "1 input failed (the first: bad.dat:2:1: error[E021]: ",
+        "1 input failed (the first: bad.dat:2:8: error[E020]: ",
         "1 input file not found (the first: b.dat), so changes in them are not known; run it in the directory",
         "out: 1 of 1 shard is done; `tumble merge out` combines them",
     ]) {
         assert!(line.starts_with(expected), "{line}");
     }
-    assert!(lines[2].ends_with("; `tumble eval … --resume` tries them again"), "{}", lines[2]);
+    assert!(
+        lines[2].ends_with("; `tumble eval … --resume` tries them again"),
+        "{}",
+        lines[2]
+    );
 }
 
 /// An input that became a directory is none any more: its result is pruned.
@@ -981,7 +994,11 @@ fn the_result_of_an_input_that_became_a_directory_is_pruned() {
     assert!(check.words.contains(expected), "{}", check.words);
     let pruned = line("eval in -o out --resume --prune");
     assert_eq!(pruned.code, 0, "{}", pruned.words);
-    assert!(pruned.words.contains("b.npy: removed; its input is gone"), "{}", pruned.words);
+    assert!(
+        pruned.words.contains("b.npy: removed; its input is gone"),
+        "{}",
+        pruned.words
+    );
     assert_eq!(names(&folder.join("out")), ["a.npy", "manifest.jsonl"]);
     assert_eq!(line("check out").code, 0);
 }
@@ -999,7 +1016,9 @@ fn results_do_not_depend_on_the_path_of_the_input() {
         }
         let of = |name: &str| fs::read(folder.join(name)).unwrap();
         assert!(of("one.npz") == of("two.npz"), "{command}");
-        let text = of("one.npz").windows(5 * 4).any(|it| it == "a\0\0\0.\0\0\0d\0\0\0a\0\0\0t\0\0\0".as_bytes());
+        let text = of("one.npz")
+            .windows(5 * 4)
+            .any(|it| it == "a\0\0\0.\0\0\0d\0\0\0a\0\0\0t\0\0\0".as_bytes());
         assert!(text, "{command}: no name of the input");
     }
 }

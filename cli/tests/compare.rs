@@ -1215,20 +1215,36 @@ fn directories_are_refused_for_the_right_reason() {
         run(folder, &line.split(' ').collect::<Vec<_>>())
     };
     for (tolerance, reason) in [
-        ("--tolerance 10", "they differ: 1 pair with tracks or scalars in only one of the files\n"),
-        ("--tolerance 1", "they differ: 1 pair over the limit, 1 pair with tracks or scalars in only one of the files\n"),
+        (
+            "--tolerance 10",
+            "they differ: 1 pair with tracks or scalars in only one of the files\n",
+        ),
+        (
+            "--tolerance 1",
+            "they differ: 1 pair over the limit, 1 pair with tracks or scalars in only one of the files\n",
+        ),
     ] {
         let found = of(tolerance);
         assert_eq!(found.code, 8, "{}", found.words);
         assert!(found.words.ends_with(reason), "{}", found.words);
     }
     let empty = run(folder, &["compare", "empty", "empty"]);
-    assert!(empty.words.contains("is a directory without files in readable formats"), "{}", empty.words);
+    assert!(
+        empty
+            .words
+            .contains("is a directory without files in readable formats"),
+        "{}",
+        empty.words
+    );
     // A clip of tracks beside one of scalars has nothing to compare.
     for files in [["a.dat", "da/x.csv"], ["da/x.csv", "a.dat"]] {
         let found = run(folder, &[&["compare"][..], &files].concat());
         let expected = "error: da/x.csv has only scalars, and none of them has the name of a scalar of a.dat\n";
-        assert!(found.code == 4 && found.words.contains(expected), "{}", found.words);
+        assert!(
+            found.code == 4 && found.words.contains(expected),
+            "{}",
+            found.words
+        );
     }
 }
 
@@ -1260,7 +1276,10 @@ fn options_without_effect_on_scalars_are_refused() {
         let found = run(folder, &[&["compare", words[0]][..], &words].concat());
         assert_eq!(found.code, code, "{line}: {}", found.words);
         if code == 2 {
-            let expected = format!("error: {} has no effect where only scalars are compared; ", words[1]);
+            let expected = format!(
+                "error: {} has no effect where only scalars are compared; ",
+                words[1]
+            );
             assert!(found.words.contains(&expected), "{line}: {}", found.words);
         }
     }
@@ -1277,13 +1296,28 @@ fn the_order_of_the_second_directory_applies_where_there_is_one() {
         std::fs::write(folder.join(side).join("p.tum"), tum).unwrap();
         std::fs::copy(folder.join("a.dat"), folder.join(side).join("a.dat")).unwrap();
     }
-    let line = ["compare", "one", "two", "--second-source-order", "wxyz", "--tolerance", "1e-4"];
+    let line = [
+        "compare",
+        "one",
+        "two",
+        "--second-source-order",
+        "wxyz",
+        "--tolerance",
+        "1e-4",
+    ];
     succeed(folder, &line);
-    assert_eq!(run(folder, &["compare", "one", "two", "--tolerance", "1e-4"]).code, 8);
+    assert_eq!(
+        run(folder, &["compare", "one", "two", "--tolerance", "1e-4"]).code,
+        8
+    );
     for side in ["one", "two"] {
         std::fs::remove_file(folder.join(side).join("p.tum")).unwrap();
     }
     let refused = run(folder, &line);
     let expected = "--second-source-order has no effect on dat; it is for ";
-    assert!(refused.code == 2 && refused.words.contains(expected), "{}", refused.words);
+    assert!(
+        refused.code == 2 && refused.words.contains(expected),
+        "{}",
+        refused.words
+    );
 }

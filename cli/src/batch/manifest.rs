@@ -220,7 +220,7 @@ impl Manifest {
         command: &str,
     ) -> Result<(), Failure> {
         let commands = CommandsOfResults::of(&self.previous, &self.inputs);
-        commands.check(&self.folder, results, command)
+        commands.check(&self.folder, results.iter().flatten(), command)
     }
 
     /// Adds the line of a result, in one piece.
@@ -437,7 +437,11 @@ impl InputPresence {
     /// Whether an input without a result is present.
     fn of_input(entry: &InputEntry) -> Self {
         // Directories that could not be read have no result.
-        Self::of(&entry.input, entry.result.as_deref(), entry.result.is_none())
+        Self::of(
+            &entry.input,
+            entry.result.as_deref(),
+            entry.result.is_none(),
+        )
     }
 
     /// Whether the input with this path, whose result has this name, is present. It is gone if the directory that the

@@ -258,7 +258,7 @@ impl<'a> PreviewedFolder<'a> {
         if options.resume && !options.overwrite {
             let result_names = name_results(files, out, format, options.naming);
             let commands = CommandsOfResults::of(&lines.entries, &lines.inputs);
-            commands.check(out, &result_names, options.command)?;
+            commands.check(out, result_names.iter().flatten(), options.command)?;
         }
         let (unfinished, failed) = (lines.unfinished(), failed_before(&lines));
         Ok(Self {

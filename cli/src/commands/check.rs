@@ -204,9 +204,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     };
     let unreadable = count_of(|fault| matches!(fault, Fault::Unreadable(_)));
     let of_removed_clips = count_of(|fault| matches!(fault, Fault::RemovedClip(_)));
-    let of_total = |count: usize, verb: &str| {
-        (count > 0).then(|| format!("{count} of {total} {verb}"))
-    };
+    let of_total =
+        |count: usize, verb: &str| (count > 0).then(|| format!("{count} of {total} {verb}"));
     // A manifest is recognised by its first line.
     let is_known = shards.is_some() || entry::open(folder).is_ok();
     let remedies = Remedies::new(&lines, &faults, is_known);
@@ -314,7 +313,11 @@ impl Remedies {
             false => "the first line of the manifest is damaged",
         };
         let lines = self.lines("--overwrite");
-        let make = if self.commands.len() == 1 { "makes" } else { "make" };
+        let make = if self.commands.len() == 1 {
+            "makes"
+        } else {
+            "make"
+        };
         Some(format!("{why}: {lines} {make} all results again"))
     }
 

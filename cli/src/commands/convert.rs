@@ -231,7 +231,11 @@ impl Arguments {
             document => write_keys(work, &parts, document, &options)?,
         };
         let clips = words::count(parts.len(), "clip");
-        let done = format!("{clips}, {}{}", keys(&parts), mirrored_text(&parts, &changed));
+        let done = format!(
+            "{clips}, {}{}",
+            keys(&parts),
+            mirrored_text(&parts, &changed)
+        );
         Ok(work.result(written, &done, None))
     }
 

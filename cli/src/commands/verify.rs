@@ -106,7 +106,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
             };
             let clip = arguments.inputs.tracks.select(clip, &name)?;
             let clip = (&*name, &*clip);
-            let found = arguments.compare(&device, &samples, clip, &methods, (&mut progress, mark))?;
+            let found =
+                arguments.compare(&device, &samples, clip, &methods, (&mut progress, mark))?;
             let is_nothing = found.iter().any(|line| line.verdict == Verdict::Nothing);
             lines.extend(found);
             if is_nothing {

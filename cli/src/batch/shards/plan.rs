@@ -247,9 +247,9 @@ impl ShardPlan {
         let path = folder.join(name);
         let path = path.display();
         Some(Failure::usage(match resume {
-            true => format!(
-                "{path}: exists, and no manifest lists it; give --overwrite to replace it"
-            ),
+            true => {
+                format!("{path}: exists, and no manifest lists it; give --overwrite to replace it")
+            }
             false => format!(
                 "{path}: exists; give --overwrite to replace it (--resume skips what is done)"
             ),

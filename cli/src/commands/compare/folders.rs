@@ -151,8 +151,12 @@ pub(super) fn run(arguments: &Arguments, folders: [&Path; 2]) -> Result<(), Fail
         let pairs = words::count(count, "pair");
         match kind {
             FaultKind::Over => format!("{pairs} over the limit"),
-            FaultKind::NotFinite => format!("{pairs} with numbers that only one has as NaN or infinite"),
-            FaultKind::Missing => format!("{pairs} with tracks or scalars in only one of the files"),
+            FaultKind::NotFinite => {
+                format!("{pairs} with numbers that only one has as NaN or infinite")
+            }
+            FaultKind::Missing => {
+                format!("{pairs} with tracks or scalars in only one of the files")
+            }
         }
     }));
     if partial > 0 && has_bound {

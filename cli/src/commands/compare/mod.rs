@@ -446,7 +446,11 @@ impl Arguments {
                 "--top",
                 "leave it out, or list the scalars by --json or --csv",
             ),
-            (!tolerates, "--tolerance", "none is an angle; leave it out, or require by 0 that all are equal"),
+            (
+                !tolerates,
+                "--tolerance",
+                "none is an angle; leave it out, or require by 0 that all are equal",
+            ),
             (!distances, "--distance", "none is a length; leave it out"),
         ] {
             if is_idle {

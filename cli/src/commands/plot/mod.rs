@@ -549,7 +549,12 @@ impl FigureWriter {
         destination.write(None, |out| out.write_all(&bytes))?;
         let device = &self.device.label;
         let inputs = [input.to_owned()];
-        (self.drawn).push(DrawnFile::new(&inputs, destination.path(), device, self.mark));
+        (self.drawn).push(DrawnFile::new(
+            &inputs,
+            destination.path(),
+            device,
+            self.mark,
+        ));
         Ok(())
     }
 }

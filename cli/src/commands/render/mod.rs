@@ -253,7 +253,12 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         .map_err(|error| Failure::writing(&arguments.out.display().to_string(), &error))?;
     arguments.render_frames(kind, &scene, &timeline, &inputs)?;
     if arguments.json {
-        let film = DrawnFile::new(&inputs, &arguments.out, &device.label, WarningMark::default());
+        let film = DrawnFile::new(
+            &inputs,
+            &arguments.out,
+            &device.label,
+            WarningMark::default(),
+        );
         listing::records(&[film.with_frames(timeline.len())], &[])?;
     }
     words::note(&format!(

@@ -11,8 +11,8 @@ use tumble_routes::walkers::Plan;
 use crate::batch::target::{self, Destination};
 use crate::commands::route::arguments::Arguments;
 use crate::commands::route::tables::Participants;
-use crate::messages::warnings::RecordedWarning;
 use crate::messages::exit::Failure;
+use crate::messages::warnings::RecordedWarning;
 
 /// A point of a route.
 pub(super) struct RoutePoint {

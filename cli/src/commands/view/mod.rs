@@ -186,7 +186,12 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let text = arguments.page(&mut shown, &methods, menu, &mut device)?;
     destination.write(None, |out| out.write_all(text.as_bytes()))?;
     if arguments.json {
-        let page = DrawnFile::new(&inputs, destination.path(), &device.label, WarningMark::default());
+        let page = DrawnFile::new(
+            &inputs,
+            destination.path(),
+            &device.label,
+            WarningMark::default(),
+        );
         listing::records(&[page], &failed)?;
     }
     words::note(&format!(
