@@ -1022,3 +1022,29 @@ fn results_do_not_depend_on_the_path_of_the_input() {
         assert!(text, "{command}: no name of the input");
     }
 }
+
+/// A dry run refuses the results that the batch then refuses.
+#[cfg(unix)]
+#[test]
+fn a_dry_run_refuses_what_cannot_be_replaced() {
+    let temporary = sample_folder();
+    let folder = temporary.path();
+    let line = |text: &str| run(folder, &text.split(' ').collect::<Vec<_>>());
+    fs::create_dir_all(folder.join("in/deep")).unwrap();
+    for name in ["in/a.dat", "in/deep/b.dat", "in/c.dat"] {
+        fs::copy(folder.join("a.dat"), folder.join(name)).unwrap();
+    }
+    assert_eq!(line("eval in -o out").code, 0);
+    fs::remove_file(folder.join("out/a.npy")).unwrap();
+    crate::attack::pipe(&folder.join("out/a.npy"));
+    fs::rename(folder.join("out/deep"), folder.join("other")).unwrap();
+    std::os::unix::fs::symlink("../other", folder.join("out/deep")).unwrap();
+    let (dry, done) = (line("eval in -o out --resume -n"), line("eval in -o out --resume"));
+    assert_eq!((dry.code, done.code), (3, 3), "{} {}", dry.words, done.words);
+    let refusals = |words: &str| -> Vec<String> {
+        let lines = words.lines().filter(|line| line.starts_with("error: out/"));
+        lines.map(str::to_owned).collect()
+    };
+    assert_eq!(refusals(&dry.words), refusals(&done.words));
+    assert_eq!(refusals(&done.words).len(), 2, "{}", done.words);
+}
