@@ -967,7 +967,7 @@ fn faults_that_are_found_have_a_line_each() {
     assert_eq!(lines.len(), 5, "{}", check.words);
     for (line, expected) in lines[1..].iter().zip([
         "error: 1 of 2 results changed; `tumble eval … --resume` makes them again",
-        "1 input failed (the first: bad.dat:2:1: error[E021]: ",
+        "1 input failed (the first: bad.dat:2:8: error[E020]: ",
         "1 input file not found (the first: b.dat), so changes in them are not known; run it in the directory",
         "out: 1 of 1 shard is done; `tumble merge out` combines them",
     ]) {
@@ -1025,4 +1025,30 @@ fn results_do_not_depend_on_the_path_of_the_input() {
             .any(|it| it == "a\0\0\0.\0\0\0d\0\0\0a\0\0\0t\0\0\0".as_bytes());
         assert!(text, "{command}: no name of the input");
     }
+}
+
+/// A dry run refuses the results that the batch then refuses.
+#[cfg(unix)]
+#[test]
+fn a_dry_run_refuses_what_cannot_be_replaced() {
+    let temporary = sample_folder();
+    let folder = temporary.path();
+    let line = |text: &str| run(folder, &text.split(' ').collect::<Vec<_>>());
+    fs::create_dir_all(folder.join("in/deep")).unwrap();
+    for name in ["in/a.dat", "in/deep/b.dat", "in/c.dat"] {
+        fs::copy(folder.join("a.dat"), folder.join(name)).unwrap();
+    }
+    assert_eq!(line("eval in -o out").code, 0);
+    fs::remove_file(folder.join("out/a.npy")).unwrap();
+    crate::attack::pipe(&folder.join("out/a.npy"));
+    fs::rename(folder.join("out/deep"), folder.join("other")).unwrap();
+    std::os::unix::fs::symlink("../other", folder.join("out/deep")).unwrap();
+    let (dry, done) = (line("eval in -o out --resume -n"), line("eval in -o out --resume"));
+    assert_eq!((dry.code, done.code), (3, 3), "{} {}", dry.words, done.words);
+    let refusals = |words: &str| -> Vec<String> {
+        let lines = words.lines().filter(|line| line.starts_with("error: out/"));
+        lines.map(str::to_owned).collect()
+    };
+    assert_eq!(refusals(&dry.words), refusals(&done.words));
+    assert_eq!(refusals(&done.words).len(), 2, "{}", done.words);
 }

@@ -222,7 +222,7 @@ impl Manifest {
         command: &str,
     ) -> Result<(), Failure> {
         let commands = CommandsOfResults::of(&self.previous, &self.inputs);
-        commands.check(&self.folder, results, command)
+        commands.check(&self.folder, results.iter().flatten(), command)
     }
 
     /// Adds the line of a result, in one piece.

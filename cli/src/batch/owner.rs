@@ -6,7 +6,6 @@ use std::path::Path;
 
 use crate::batch::digest::InputFile;
 use crate::batch::entry::{InputEntries, InputEntry, InputState, ManifestEntry};
-use crate::batch::result_names::ResultName;
 use crate::messages::exit::Failure;
 use crate::messages::{names, words};
 
@@ -71,10 +70,10 @@ impl<'a> CommandsOfResults<'a> {
     }
 
     /// Refuses to resume results that another command made, or a directory of which this command made nothing.
-    pub(crate) fn check(
+    pub(crate) fn check<'b>(
         &self,
         folder: &Path,
-        results: &[ResultName],
+        results: impl IntoIterator<Item = &'b String>,
         command: &str,
     ) -> Result<(), Failure> {
         let of_result = |name: &String| {
@@ -86,7 +85,7 @@ impl<'a> CommandsOfResults<'a> {
             let other = all().next().filter(|_| all().all(|it| it != command))?;
             Some((folder.to_owned(), other))
         };
-        let found = results.iter().flatten().find_map(of_result);
+        let found = results.into_iter().find_map(of_result);
         let Some((path, other)) = found.or_else(of_folder) else {
             return Ok(());
         };

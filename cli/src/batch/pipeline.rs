@@ -541,9 +541,11 @@ impl<'a> Pipeline<'a> {
         };
         if failure.is_final() {
             let path = current.input.file.path().to_owned();
-            let of_failed = std::mem::take(&mut current.of_failed);
+            let mut warnings = std::mem::take(&mut current.of_failed);
+            let of_input = current.input.loaded.warnings.iter();
+            warnings.splice(..0, of_input.map(RecordedWarning::from));
             self.current = None;
-            self.add(&path, None, Err(failure), of_failed);
+            self.add(&path, None, Err(failure), warnings);
         } else {
             current.failed.push(failure);
         }

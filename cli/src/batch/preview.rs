@@ -9,6 +9,7 @@ use std::io;
 use std::path::Path;
 
 use serde::Serialize;
+use tumble_formats::beneath::parent_beneath;
 use tumble_formats::format::Format;
 use tumble_formats::printable::printable;
 use tumble_formats::{Feature, Loaded};
@@ -258,7 +259,7 @@ impl<'a> PreviewedFolder<'a> {
         if options.resume && !options.overwrite {
             let result_names = name_results(files, out, format, options.naming);
             let commands = CommandsOfResults::of(&lines.entries, &lines.inputs);
-            commands.check(out, &result_names, options.command)?;
+            commands.check(out, result_names.iter().flatten(), options.command)?;
         }
         let (unfinished, failed) = (lines.unfinished(), failed_before(&lines));
         Ok(Self {
@@ -318,6 +319,9 @@ impl<'a> PreviewedFolder<'a> {
             let mut results = results.iter();
             results.try_for_each(|(_, output)| refuse_existing(self.out, output, is_known))?;
         }
+        for (_, output) in &results {
+            self.check_file(output, replaces)?;
+        }
         for (animation, output) in results {
             let whole = self.out.join(&output);
             let exists = std::fs::symlink_metadata(&whole).is_ok();
@@ -341,6 +345,16 @@ impl<'a> PreviewedFolder<'a> {
         }
         self.planned.end(name);
         Ok(())
+    }
+
+    /// Refuses a result whose file could not be written: something else has its name, or a link leads out of its directory.
+    fn check_file(&self, output: &str, overwrite: bool) -> Result<(), Failure> {
+        let whole = self.out.join(output);
+        parent_beneath(self.out, Path::new(output)).map_err(|error| {
+            let shown = whole.display();
+            Failure::usage(format!("{shown}: its directory cannot be used: {error}"))
+        })?;
+        Destination::new(&whole, overwrite, &[]).map(drop)
     }
 
     /// Whether the results of an input are there, made with the same options.

@@ -131,6 +131,12 @@ fn merged_part(
         return None;
     }
     let failed = record::merged_failures(folder)?;
+    let names = plan.names.iter().map(|name| name.as_deref().ok());
+    let found = names.zip(&plan.inputs);
+    let found = found.filter_map(|(name, found)| Some((name?, found)));
+    if !record::other_owners(folder, &found.collect()).is_empty() {
+        return None;
+    }
     let options = &evaluator.request.options.text;
     let limits = arguments.inputs.limits();
     let is_settled = |shard: usize| {
