@@ -303,6 +303,22 @@ fn bodies_with_z_up_are_converted_or_refused() {
     assert_eq!(arrays(&folder.join("5.npz"))["contacts"].1[10], 1.0);
 }
 
+/// The axis that is taken to point up in a body's root motion is said, unless it is stated.
+#[test]
+fn root_motion_of_bodies_says_what_points_up() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    write_bodies(folder);
+    for (options, is_said) in [("", true), ("--vertical z", false), ("--up-axis y", false)] {
+        let words = format!(
+            "eval amass.npz --offsets offsets.txt {options} --root-motion in-place -o a.npz --overwrite"
+        );
+        let made = line(folder, &words);
+        let said = "files of SMPL bodies do not state what points up, so y is taken";
+        assert_eq!(made.words.contains(said), is_said, "{}", made.words);
+    }
+}
+
 /// Rotations of Kimodo are those of joints that rest in a T-pose.
 #[test]
 fn kimodo_of_other_rest_poses_is_refused() {

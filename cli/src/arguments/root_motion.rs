@@ -2,6 +2,7 @@
 
 use clap::Args;
 use clap::builder::TypedValueParser;
+use glam::DVec3;
 use tumble_formats::learning::{Ground, HeadingSource};
 use tumble_formats::motion::Motion;
 use tumble_formats::root_motion::{RootMotionOptions, RootMotionRule, root_joint};
@@ -9,6 +10,7 @@ use tumble_formats::root_motion::{RootMotionOptions, RootMotionRule, root_joint}
 use crate::arguments::options::CommandLine;
 use crate::arguments::output::one_of;
 use crate::messages::exit::{ALL_INPUTS, Failure};
+use crate::messages::words;
 
 /// The axis that points up in a motion.
 #[derive(Debug, Clone, Args)]
@@ -26,11 +28,12 @@ impl VerticalArguments {
 
     /// The axis that points up in a clip. `is_robot`: the clip is of a robot that the command line names.
     pub(crate) fn ground(&self, clip: &Motion, is_robot: bool) -> Ground {
-        self.vertical
-            .unwrap_or(match is_robot || clip.robot.is_some() {
-                true => Ground::Z,
-                false => Ground::Y,
-            })
+        let up_of_body = clip.body.as_ref().and_then(|body| body.up);
+        let is_z_up = is_robot || clip.robot.is_some() || up_of_body == Some(DVec3::Z);
+        self.vertical.unwrap_or(match is_z_up {
+            true => Ground::Z,
+            false => Ground::Y,
+        })
     }
 }
 
@@ -93,6 +96,17 @@ impl RootMotionArguments {
             ground: self.vertical.ground(clip, is_robot),
             heading: self.heading,
             joint: self.root_joint.clone(),
+        }
+    }
+
+    /// Says which axis is taken to point up for a body whose file does not state it.
+    pub(crate) fn say_assumption(&self, name: &str, clip: &Motion) {
+        let is_unknown = clip.body.as_ref().is_some_and(|body| body.up.is_none());
+        if is_unknown && !self.vertical.is_set() {
+            words::warning(&format!(
+                "{name}: files of SMPL bodies do not state what points up, so y is taken; most have z up (--up-axis y \
+                 converts them, --vertical z takes z)"
+            ));
         }
     }
 

@@ -489,6 +489,7 @@ impl EvaluationJob<'_> {
         let engine = Engine::new(Device::Cpu).map_err(|error| Failure::evaluating(name, &error))?;
         let samples = track_samples(clip, &engine);
         let samples = samples.map_err(|error| Failure::evaluating(name, &error))?;
+        root.say_assumption(name, clip);
         let options = root.options(clip, self.arguments.inputs.reading.robot()?.is_some());
         let treated = keys_with_root_motion(clip, &samples, &options, root.rule());
         treated
@@ -652,6 +653,7 @@ impl EvaluationJob<'_> {
                 all.push((Cow::Borrowed(*clip), found));
                 continue;
             }
+            root.say_assumption(name, clip);
             let options = root.options(clip, self.arguments.inputs.reading.robot()?.is_some());
             let treated = with_root_motion(clip, &found, &options, root.rule());
             let (clip, found) = treated.map_err(|error| root.failure(name, &error))?;
