@@ -211,7 +211,7 @@ fn expected(
     (0..at.len()).flat_map(of_sample).collect()
 }
 
-/// The bound of the documentation, for a robot that is about 1 m large.
+/// The bounds of the documentation, for a robot that is about 1 m large. Angles of 600 rad are rounded to 6e-5 rad.
 #[test]
 fn bodies_are_those_of_f64() {
     let mut random = Random(31);
@@ -219,7 +219,7 @@ fn bodies_are_those_of_f64() {
     let (tables, spans, cells) = clips(&mut random);
     let parts = (&spans[..], &cells[..]);
     let engine = Engine::new(Device::Cpu).unwrap();
-    let mut largest = [0f64; 4];
+    let mut largest = [[0f64; 4]; 2];
     for at_mass in [false, true] {
         let bodies = BodyTables::new(tables.clone(), frames(&tree, at_mass, true)).unwrap();
         let at = instances(&mut random, &bodies, 500);
@@ -242,7 +242,6 @@ fn bodies_are_those_of_f64() {
             };
             let of_linear = (vector(&found.velocities) - linear).length();
             let of_angular = vector(&found.angular_velocities) - motion.velocity.angular;
-            // The rounding of an angle of 400 rad is not that of the walk.
             let sizes = [
                 1.0,
                 1.0,
@@ -250,7 +249,8 @@ fn bodies_are_those_of_f64() {
                 1.0 + motion.velocity.angular.length(),
             ];
             let errors = [apart, angle, of_linear, of_angular.length()];
-            for ((largest, error), size) in largest.iter_mut().zip(errors).zip(sizes) {
+            let of_clip = &mut largest[at[sample].0 as usize];
+            for ((largest, error), size) in of_clip.iter_mut().zip(errors).zip(sizes) {
                 *largest = largest.max(error / size);
             }
         }
@@ -262,14 +262,10 @@ fn bodies_are_those_of_f64() {
         assert!(rates.eq(found.joint_rates.iter().copied()));
     }
     println!("{largest:?}");
-    let bounds = [4e-7, 1e-6, 4e-6, 4e-6];
-    assert!(
-        largest
-            .iter()
-            .zip(bounds)
-            .all(|(&error, bound)| error <= bound),
-        "{largest:?}"
-    );
+    for (errors, bounds) in largest.iter().zip([[4e-7, 1e-6, 2e-6, 2e-6], [1e-4; 4]]) {
+        let mut pairs = errors.iter().zip(bounds);
+        assert!(pairs.all(|(&error, bound)| error <= bound), "{largest:?}");
+    }
 }
 
 #[test]
