@@ -690,10 +690,10 @@ class MotionLibrary(Generic[_A]):
 
         >>> import tumble
         >>> half = 0.5 ** 0.5
-        >>> wave = tumble.Clip([0.0], [[0, 0, 0, 1], [half, half, 0, 0], [0, 0, 0, 1]], layout="track", name="wave",
-        ...                    names=["spine", "left_arm", "right_arm"], parents=[None, 0, 0])
+        >>> wave = tumble.Clip([0.0], [[[0, 0, 0, 1]], [[half, half, 0, 0]], [[0, 0, 0, 1]]], layout="track",
+        ...                    name="wave", names=["spine", "left_arm", "right_arm"], parents=[None, 0, 0])
         >>> both = tumble.MotionLibrary([wave]).with_mirrored("x")
-        >>> both.names, both.sample(1, 0.0).rotations[2].round(2)
+        >>> both.names, both.sample(1, 0.0, arrays=["rotations"]).rotations[2].round(2)
         (['wave', 'wave (mirrored)'], array([ 0.71, -0.71, -0.  ,  0.  ], dtype=float32))
         """
         axes = ("x", "y", "z")
