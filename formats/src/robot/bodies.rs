@@ -349,7 +349,7 @@ pub fn motions(
                 motion.velocity.linear = motion.velocity_at(centre);
             }
         }
-        Ok(())
+        Ok::<(), TreeError>(())
     })?;
     Ok(all)
 }
