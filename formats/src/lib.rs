@@ -76,7 +76,7 @@ pub use crate::feature::Feature;
 pub use crate::format::{Format, Loaded, ReadOptions};
 pub use crate::limits::Limits;
 pub use crate::motion::{
-    adjust, carried_mesh, collapse, compare, end_frame, join, keyed, keys, origin, outside, packed,
+    adjust, carried_mesh, collapse, compare, crowd_library, end_frame, join, keyed, keys, origin, outside, packed,
     poses, reduce, retime, root_motion, sample, scalars, signs, skeleton, smooth, trajectory, trim,
     world,
 };

@@ -5,6 +5,7 @@ pub mod adjust;
 pub mod carried_mesh;
 pub mod collapse;
 pub mod compare;
+pub mod crowd_library;
 mod dense;
 pub mod end_frame;
 pub(crate) mod grid;

@@ -203,11 +203,7 @@ impl SharedSkeleton {
 
     /// The skeleton in the form that the engine's library takes.
     pub(crate) fn of_engine(&self) -> PyResult<Skeleton> {
-        let joints = self.skeleton.joints().iter();
-        let parents = joints.clone().map(|joint| joint.parent).collect();
-        let offsets = joints.map(|joint| joint.rest.translation).collect();
-        let made = Skeleton::new(parents, offsets)
-            .and_then(|skeleton| skeleton.with_names(self.skeleton.names()));
+        let made = self.skeleton.of_engine();
         made.map_err(|error| input(format!("skeleton: {error}")))
     }
 

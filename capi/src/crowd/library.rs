@@ -4,8 +4,8 @@ use std::ffi::{CString, c_char};
 use std::sync::{OnceLock, RwLock, RwLockReadGuard, RwLockWriteGuard};
 
 use glam::{Affine3A, Mat3A, Vec3A};
+use tumble::VectorMethod;
 use tumble::crowd::{CrowdLibrary, CrowdStorage};
-use tumble::{Skeleton, VectorMethod};
 use tumble_formats::motion::{Joint, Transform};
 use tumble_formats::skeleton::ClipSkeleton;
 
@@ -33,13 +33,7 @@ impl Object for TumbleCrowdLibrary {
 impl TumbleCrowdLibrary {
     /// An empty library; 0 ticks mean the default.
     pub(crate) fn new(joints: ClipSkeleton, ticks_per_second: u32) -> Result<Self, Failure> {
-        let rest = joints.joints().iter();
-        let parents = rest.clone().map(|joint| joint.parent).collect();
-        let offsets = rest.map(|joint| joint.rest.translation).collect();
-        let mut skeleton = Skeleton::new(parents, offsets)?;
-        if joints.is_named() {
-            skeleton = skeleton.with_names(joints.names())?;
-        }
+        let skeleton = joints.of_engine()?;
         let library = match ticks_per_second {
             0 => CrowdLibrary::new(&skeleton)?,
             ticks => CrowdLibrary::with_ticks(&skeleton, ticks)?,

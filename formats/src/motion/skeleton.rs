@@ -3,7 +3,9 @@
 use std::borrow::Cow;
 
 use glam::{DVec3, Vec3};
-use tumble::{Channel, JointMatchError, JointPairs, Joints, TrackError, TrackSet};
+use tumble::{
+    Channel, JointMatchError, JointPairs, Joints, Skeleton, SkeletonError, TrackError, TrackSet,
+};
 
 use crate::motion::adjust::{OffsetsError, set_offsets};
 use crate::motion::{Joint, Motion, Transform};
@@ -153,6 +155,20 @@ impl ClipSkeleton {
             }
         }));
         Ok(())
+    }
+
+    /// The skeleton in the form that the engine takes.
+    ///
+    /// # Errors
+    /// When there are no joints, the parents form a cycle, or an offset is not finite.
+    pub fn of_engine(&self) -> Result<Skeleton, SkeletonError> {
+        let parents = self.rest.iter().map(|joint| joint.parent).collect();
+        let offsets = self.rest.iter().map(|joint| joint.rest.translation);
+        let skeleton = Skeleton::new(parents, offsets.collect())?;
+        match self.is_named() {
+            true => skeleton.with_names(self.names()),
+            false => Ok(skeleton),
+        }
     }
 
     /// Whether any joint has a name.

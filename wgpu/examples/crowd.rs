@@ -1,17 +1,15 @@
-//! A crowd on the Vulkan device of wgpu: `cargo run --manifest-path examples/wgpu/Cargo.toml [CHARACTERS]`.
+//! A crowd on the Vulkan device of wgpu: `cargo run --manifest-path wgpu/Cargo.toml --example crowd [CHARACTERS]`.
 //!
 //! wgpu makes the device, the buffers and the command buffers, and a kernel of the renderer in WGSL moves a point of each
 //! joint by the joint's matrix. Tumble records the matrices of every frame into wgpu's command buffers. At the end the
-//! matrices and the points are compared with the CPU's. docs/wgpu.md explains the three traps, which are marked below.
+//! matrices and the points are compared with the CPU's. docs/wgpu.md explains the three traps.
 
 use std::error::Error;
 
 use tumble::crowd::{Crowd, CrowdLayer, CrowdLibrary, CrowdValues};
 use tumble::glam::{Quat, Vec3};
-use tumble::verify::{Agreement, UNWRITTEN, WordBound, WordType, compare_buffers};
-use tumble::vulkan::{CrowdTarget, VulkanBuffer, VulkanHandles, VulkanQueue};
-use tumble::{Device, Engine, EngineOptions, Skeleton, TrackSet, VectorMethod, bytemuck, method};
-use wgpu::hal::api::Vulkan;
+use tumble::verify::{Agreement, WordBound, WordType, compare_buffers};
+use tumble::{Device, Engine, EngineOptions, Skeleton, TrackSet, VectorMethod, method};
 
 const JOINTS: usize = 12;
 const FRAMES: usize = 30;
@@ -55,47 +53,15 @@ impl Renderer {
 
     /// An engine on wgpu's device. It must be dropped before the device.
     fn engine(&self) -> Result<Engine, Box<dyn Error>> {
-        // SAFETY: nothing is destroyed by hand.
-        let device = unsafe { self.device.as_hal::<Vulkan>() };
-        let device = device.ok_or("wgpu's device is not a Vulkan device")?;
-        let instance = device.shared_instance();
-        let mut handles = VulkanHandles::new(
-            instance.entry().clone(),
-            instance.raw_instance().clone(),
-            instance.instance_api_version(),
-            device.raw_physical_device(),
-            device.raw_device().clone(),
-            VulkanQueue::new(device.raw_queue(), device.queue_family_index()),
-        );
-        handles.shader_int64 = self
-            .device
-            .features()
-            .contains(wgpu::Features::SHADER_INT64);
-        handles.shader_float_controls = device
-            .enabled_device_extensions()
-            .contains(&tumble::ash::khr::shader_float_controls::NAME);
+        let handles = tumble_wgpu::handles(&self.device)?;
         // SAFETY: the handles belong together, and the engine is dropped before them. Trap 3: the engine submits to
         // wgpu's queue, so nothing else submits meanwhile: this program has one thread.
         Ok(unsafe { Engine::from_vulkan(handles, &EngineOptions::default())? })
     }
 
-    /// A buffer of words that are `UNWRITTEN`. Trap 2: wgpu clears a buffer before its first use that it knows of, after
-    /// Tumble has written it. It leaves buffers alone that were mapped at their creation.
-    fn buffer(&self, size: u64, usage: wgpu::BufferUsages) -> Result<wgpu::Buffer, Box<dyn Error>> {
-        let buffer = self.device.create_buffer(&wgpu::BufferDescriptor {
-            label: None,
-            size,
-            usage: usage | wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST,
-            mapped_at_creation: true,
-        });
-        let words = vec![UNWRITTEN; size as usize / 4];
-        buffer
-            .get_mapped_range_mut(..)?
-            .copy_from_slice(bytemuck::cast_slice(&words));
-        buffer.unmap();
-        // The copy from the mapped memory is part of the next submission.
-        self.queue.submit([]);
-        Ok(buffer)
+    /// A buffer for results.
+    fn buffer(&self, size: u64) -> wgpu::Buffer {
+        tumble_wgpu::buffer(&self.device, &self.queue, size, wgpu::BufferUsages::COPY_SRC)
     }
 
     /// The bytes of a buffer.
@@ -114,36 +80,6 @@ impl Renderer {
         let bytes = staging.get_mapped_range(..)?.to_vec();
         Ok(bytes)
     }
-}
-
-/// A range of Tumble's for all of a buffer of wgpu's.
-fn range_of(buffer: &wgpu::Buffer) -> Result<VulkanBuffer, Box<dyn Error>> {
-    // SAFETY: nothing is destroyed by hand.
-    let raw = unsafe { buffer.as_hal::<Vulkan>() };
-    let raw = raw.ok_or("the buffer is not a Vulkan buffer")?;
-    // SAFETY: as above.
-    Ok(VulkanBuffer::new(
-        unsafe { raw.raw_handle() },
-        buffer.size(),
-    ))
-}
-
-/// Commands of wgpu's that Tumble records. Trap 1: wgpu moves its barriers to before the commands of an encoder. Tumble
-/// therefore has an encoder of its own, which is submitted before those that read the matrices.
-fn recorded(
-    renderer: &Renderer,
-    crowd: &mut Crowd,
-    target: &CrowdTarget,
-) -> Result<wgpu::CommandBuffer, Box<dyn Error>> {
-    let mut commands = renderer.device.create_command_encoder(&Default::default());
-    // SAFETY: the commands are in recording, and submitted once, in the order of the frames.
-    unsafe {
-        commands.as_hal_mut::<Vulkan, _, _>(|raw| -> Result<(), Box<dyn Error>> {
-            let raw = raw.ok_or("the commands are not Vulkan's")?;
-            Ok(crowd.record(target, raw.raw_handle())?)
-        })?;
-    }
-    Ok(commands.finish())
 }
 
 /// A chain of joints with two clips of two seconds.
@@ -187,10 +123,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     let library = library()?;
     let mut crowd = engine.crowd(&library, characters, 1)?;
     let joints = (characters * JOINTS) as u64;
-    let matrices = renderer.buffer(48 * joints, wgpu::BufferUsages::STORAGE)?;
-    let points = renderer.buffer(16 * joints, wgpu::BufferUsages::STORAGE)?;
+    let matrices = renderer.buffer(48 * joints);
+    let points = renderer.buffer(16 * joints);
     // SAFETY: wgpu's buffer has these usages and outlives the target.
-    let target = unsafe { crowd.target(CrowdValues::Model, range_of(&matrices)?)? };
+    let target = unsafe { crowd.target(CrowdValues::Model, tumble_wgpu::range(&matrices)?)? };
 
     let module = renderer
         .device
@@ -227,7 +163,9 @@ fn main() -> Result<(), Box<dyn Error>> {
 
     for frame in 0..FRAMES {
         play(&mut crowd, characters, frame)?;
-        let posed = recorded(&renderer, &mut crowd, &target)?;
+        // SAFETY: the commands are submitted once, in the order of the frames.
+        let record = |commands| unsafe { crowd.record(&target, commands) };
+        let posed = tumble_wgpu::record(&renderer.device, record)?;
         let mut drawing = renderer.device.create_command_encoder(&Default::default());
         {
             let mut pass = drawing.begin_compute_pass(&Default::default());
