@@ -122,8 +122,9 @@ mod tests {
         let at = SampleTimes::at(vec![start + 0.5]);
         let samples = ChannelMethods::AUTHORED.sample(&engine, &clips[0], &at);
         for (found, expected) in pose.iter().zip(samples.unwrap().rotations.iter()) {
-            let distance = expected.to_array().iter().zip(found).map(|(a, b)| (a - b).abs());
-            assert!(distance.fold(0.0, f32::max) < 1e-6, "{found:?} {expected}");
+            let expected = expected.to_array();
+            let distance = expected.iter().zip(found).map(|(a, b)| (a - b).abs());
+            assert!(distance.fold(0.0, f32::max) < 1e-6, "{found:?} {expected:?}");
         }
     }
 
