@@ -1043,8 +1043,17 @@ fn a_dry_run_refuses_what_cannot_be_replaced() {
     crate::attack::pipe(&folder.join("out/a.npy"));
     fs::rename(folder.join("out/deep"), folder.join("other")).unwrap();
     std::os::unix::fs::symlink("../other", folder.join("out/deep")).unwrap();
-    let (dry, done) = (line("eval in -o out --resume -n"), line("eval in -o out --resume"));
-    assert_eq!((dry.code, done.code), (3, 3), "{} {}", dry.words, done.words);
+    let (dry, done) = (
+        line("eval in -o out --resume -n"),
+        line("eval in -o out --resume"),
+    );
+    assert_eq!(
+        (dry.code, done.code),
+        (3, 3),
+        "{} {}",
+        dry.words,
+        done.words
+    );
     let refusals = |words: &str| -> Vec<String> {
         let lines = words.lines().filter(|line| line.starts_with("error: out/"));
         lines.map(str::to_owned).collect()

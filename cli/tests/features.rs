@@ -460,7 +460,11 @@ fn humanml3d_of_other_units_is_said() {
     let folder = folder.path();
     let human = crate::retarget::human(|role| role);
     fs::write(folder.join("take.bvh"), human).unwrap();
-    let made = line(folder, "features take.bvh --sets humanml3d -o a.npz");
+    let made = line(folder, "features take.bvh --sets humanml3d -o a.npz --json");
+    let json: Value = serde_json::from_slice(&made.out).unwrap();
+    let warnings = json[0]["warnings"].as_array().unwrap();
+    let codes: Vec<&Value> = warnings.iter().map(|warning| &warning["code"]).collect();
+    assert_eq!(codes, ["W930", "W931"], "{json}");
     for part in [
         "HumanML3D has 20 frames a second, and its numbers are steps from frame to frame; these are of 25 frames a \
          second (--fps 20)",

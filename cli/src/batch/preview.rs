@@ -350,6 +350,9 @@ impl<'a> PreviewedFolder<'a> {
     /// Refuses a result whose file could not be written: something else has its name, or a link leads out of its directory.
     fn check_file(&self, output: &str, overwrite: bool) -> Result<(), Failure> {
         let whole = self.out.join(output);
+        if std::fs::symlink_metadata(&whole).is_err() {
+            return Ok(());
+        }
         parent_beneath(self.out, Path::new(output)).map_err(|error| {
             let shown = whole.display();
             Failure::usage(format!("{shown}: its directory cannot be used: {error}"))
