@@ -484,7 +484,7 @@ const MOTION: [(&str, &[&str]); 6] = [
             "math/arc_tangent",
             "math/quaternion",
             "math/vector",
-            "math/turned",
+            "math/rotation_about",
             "motion/tree",
         ],
     ),
