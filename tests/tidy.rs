@@ -237,6 +237,7 @@ fn every_shader_function_has_its_twin() {
                 "wide",
                 "vector",
                 "store",
+                "pick",
             ];
             assert!(glue.contains(&name), "{name}.wgsl names no twin");
             continue;

@@ -145,11 +145,11 @@ fn clip_around(tree: &Tree, at: &Configuration, rates: &ConfigurationRates) -> M
     const HALF: f64 = 1.0 / 16.0;
     let (mut motion, times) = (Motion::default(), [0.0, 2.0 * HALF]);
     let ends = |rate: DVec3| [-HALF * rate, HALF * rate];
-    let turned = |rotation: DQuat, spin: DVec3| {
-        ends(spin).map(|turn| (DQuat::from_scaled_axis(turn) * rotation).as_quat())
+    let rotated = |rotation: DQuat, spin: DVec3| {
+        ends(spin).map(|angle| (DQuat::from_scaled_axis(angle) * rotation).as_quat())
     };
     let moved = |set: &mut TrackSet, name: &str, pose: BodyPose, rate: BodyVelocity| {
-        let keys = turned(pose.rotation.normalize(), rate.angular);
+        let keys = rotated(pose.rotation.normalize(), rate.angular);
         let track = set.track_count();
         set.push(name, &times, &keys).unwrap();
         let points = ends(rate.linear).map(|step| (pose.position + step).as_vec3());
@@ -168,7 +168,7 @@ fn clip_around(tree: &Tree, at: &Configuration, rates: &ConfigurationRates) -> M
             }
             JointKind::Ball => {
                 let rotation = at.balls[ball].normalize();
-                let keys = turned(rotation, rotation * rates.balls[ball]);
+                let keys = rotated(rotation, rotation * rates.balls[ball]);
                 set.push(&*joint.name, &times, &keys).unwrap();
                 ball += 1;
             }

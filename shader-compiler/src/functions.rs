@@ -63,7 +63,7 @@ const FUNCTIONS: [(&str, &[&str]); 38] = [
     ("inverse_rotated", &[]),
     ("canonical_product", &[]),
     ("small_angle_cubic", &[]),
-    ("turned", &[]),
+    ("rotation_about", &[]),
 ];
 
 /// The functions that `tumble-exact` offers to other shaders, with those that they call, and the files that have them.

@@ -532,7 +532,7 @@ const MOTION: [(&str, &[&str]); 7] = [
             "math/arc_tangent",
             "math/quaternion",
             "math/vector",
-            "math/turned",
+            "math/rotation_about",
             "motion/tree",
         ],
     ),

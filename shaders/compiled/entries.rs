@@ -7629,6 +7629,32 @@ pub(crate) fn rotated_by<M: Machine>(machine: &M, q: [M::F; 4], v: [M::F; 4]) ->
     }
 }
 
+/// The rotation by an angle, up to 8192 rad in magnitude, about a unit axis.
+pub(crate) fn rotation_about<M: Machine>(machine: &M, axis: [M::F; 3], angle: M::F) -> [M::F; 4] {
+    let _block = machine.block(line!(), 23);
+    let half = angle * M::F::of(0.5);
+    let shifted = half * M::F::of(QUARTERS_PER_RADIAN) + M::F::of(WHOLE_SHIFT);
+    let quarters = shifted.bits();
+    let whole = shifted - M::F::of(WHOLE_SHIFT);
+    let rest = ((half - whole * M::F::of(QUARTER_1)) - whole * M::F::of(QUARTER_2))
+        - whole * M::F::of(QUARTER_3);
+    let sines = sine_cosine(machine, rest);
+    let is_odd = quarters & 1u32 == 1u32;
+    let sign = if quarters & 2u32 == 2u32 {
+        M::F::of(-1.0)
+    } else {
+        M::F::of(1.0)
+    };
+    let sine = (if is_odd { sines[1] } else { sines[0] }) * sign;
+    let cosine = (if is_odd { -sines[0] } else { sines[1] }) * sign;
+    [
+        both(axis, [sine; 3], |x, y| x * y)[0],
+        both(axis, [sine; 3], |x, y| x * y)[1],
+        both(axis, [sine; 3], |x, y| x * y)[2],
+        cosine,
+    ]
+}
+
 /// Turns a base on by what a layer differs from its reference: base (reference⁻¹ layer)^weight.
 pub(crate) fn rotation_added<M: Machine>(
     machine: &M,
@@ -9410,32 +9436,6 @@ pub(crate) fn transform_row<M: Machine>(
     result
 }
 
-/// The rotation by an angle, up to 8192 rad in magnitude, about a unit axis.
-pub(crate) fn turned<M: Machine>(machine: &M, axis: [M::F; 3], angle: M::F) -> [M::F; 4] {
-    let _block = machine.block(line!(), 23);
-    let half = angle * M::F::of(0.5);
-    let shifted = half * M::F::of(QUARTERS_PER_RADIAN) + M::F::of(WHOLE_SHIFT);
-    let quarters = shifted.bits();
-    let whole = shifted - M::F::of(WHOLE_SHIFT);
-    let rest = ((half - whole * M::F::of(QUARTER_1)) - whole * M::F::of(QUARTER_2))
-        - whole * M::F::of(QUARTER_3);
-    let sines = sine_cosine(machine, rest);
-    let is_odd = quarters & 1u32 == 1u32;
-    let sign = if quarters & 2u32 == 2u32 {
-        M::F::of(-1.0)
-    } else {
-        M::F::of(1.0)
-    };
-    let sine = (if is_odd { sines[1] } else { sines[0] }) * sign;
-    let cosine = (if is_odd { -sines[0] } else { sines[1] }) * sign;
-    [
-        both(axis, [sine; 3], |x, y| x * y)[0],
-        both(axis, [sine; 3], |x, y| x * y)[1],
-        both(axis, [sine; 3], |x, y| x * y)[2],
-        cosine,
-    ]
-}
-
 pub(crate) fn unpacked<M: Machine>(machine: &M, words: [u32; 2]) -> [M::F; 4] {
     let _block = machine.block(line!(), 30);
     let a = packed_component(machine, words[0]);
@@ -9652,7 +9652,7 @@ pub(crate) fn walk_to<M: Machine>(
         }
         if frame.kind == FRAME_HINGE {
             let _block = machine.block(line!(), 6);
-            let result_2 = turned(machine, frame.axis, value);
+            let result_2 = rotation_about(machine, frame.axis, value);
             let result_3 = product(machine, axes, result_2);
             rotation = result_3;
             let loaded_10 = rate;

@@ -978,7 +978,7 @@ pub(crate) fn small_angle_cubic<N: Choice>(
 
 /// The rotation by an angle, up to 8192 rad in magnitude, about a unit axis.
 #[inline(always)]
-pub(crate) fn turned(axis: [f32; 3], angle: f32) -> [f32; 4] {
+pub(crate) fn rotation_about(axis: [f32; 3], angle: f32) -> [f32; 4] {
     let half = angle * 0.5;
     let shifted = half * QUARTERS_PER_RADIAN + WHOLE_SHIFT;
     let quarters = shifted.to_bits();

@@ -85,7 +85,7 @@ fn walk_to(frame: TreeFrame, first_word: u32, first: u32, state: u32) {
             rate = frame.multiplier * tracks[word + VECTOR_WORDS];
         }
         if frame.kind == FRAME_HINGE {
-            rotation = product(axes, turned(frame.axis, value));
+            rotation = product(axes, rotation_about(frame.axis, value));
             angular = frame.axis * rate;
         } else {
             arm = arm + rotated(axes, frame.axis * value);

@@ -10,8 +10,11 @@ use crate::crowd_error::CrowdError;
 use crate::engine::Engine;
 use crate::gpu::external::ExportedResult;
 use crate::gpu::motion::{MappedStates, ResidentMotions, StatesRequest, TreeSource};
-use crate::output::states::{BodyArray, StoredArray};
+use crate::output::states::{BodyArray, StoredArray, StoredNumbers};
 use crate::pose::tree::TreeFrames;
+use crate::shader::{
+    ANGULAR_VELOCITY, POSITION, STATE_VECTORS, VECTOR_WORDS, VELOCITY, WORLD_ROTATION,
+};
 
 /// The clips of [`BodyTables`] in the memory of a Vulkan device, which computes the joints and bodies of a robot. They have
 /// the bits that [`BodyTables::sample_into`] computes on the CPU, and stay in memory of the device. The host uploads 8 bytes
@@ -52,7 +55,7 @@ impl DeviceBodies {
         let frames = tables.frames();
         let tree = TreeSource {
             frames: &frames.frames,
-            picks: &BodyArray::all_picks(frames),
+            picks: &BodyArray::ALL.map(|array| picks(array, frames)).concat(),
         };
         Ok(Self {
             resident: resident(engine, tables.tables(), parts, Some(tree))?,
@@ -102,7 +105,7 @@ impl DeviceBodies {
     }
 
     fn stored(&self, arrays: &[BodyArray]) -> Vec<StoredArray> {
-        let stored = |array: &BodyArray| array.stored(&self.frames);
+        let stored = |&array: &BodyArray| stored(array, &self.frames);
         arrays.iter().map(stored).collect()
     }
 }
@@ -114,5 +117,55 @@ impl fmt::Debug for DeviceBodies {
             .field("clips", &self.clips)
             .field("bytes", &self.bytes())
             .finish_non_exhaustive()
+    }
+}
+
+/// The words of an instance's states that an array has.
+fn picks(array: BodyArray, frames: &TreeFrames) -> Vec<u32> {
+    let state = STATE_VECTORS * VECTOR_WORDS;
+    let vectors = |list: &[u32], vector: u32, components: &[u32]| {
+        let of = |frame: &u32| {
+            let first = frame * state + vector * VECTOR_WORDS;
+            components.iter().map(move |component| first + component)
+        };
+        list.iter().flat_map(of).collect()
+    };
+    match array {
+        BodyArray::JointValues => frames.scalars.clone(),
+        BodyArray::JointRates => {
+            let to_rate = (VELOCITY - POSITION) * VECTOR_WORDS;
+            frames.scalars.iter().map(|word| word + to_rate).collect()
+        }
+        BodyArray::Positions => vectors(&frames.bodies, POSITION, &[0, 1, 2]),
+        BodyArray::Rotations if frames.is_w_first => {
+            vectors(&frames.bodies, WORLD_ROTATION, &[3, 0, 1, 2])
+        }
+        BodyArray::Rotations => vectors(&frames.bodies, WORLD_ROTATION, &[0, 1, 2, 3]),
+        BodyArray::Velocities => vectors(&frames.points, VELOCITY, &[0, 1, 2]),
+        BodyArray::AngularVelocities => vectors(&frames.bodies, ANGULAR_VELOCITY, &[0, 1, 2]),
+    }
+}
+
+/// The numbers that a kernel stores of an instance. Their words are those of [`picks`], array after array.
+fn stored(array: BodyArray, frames: &TreeFrames) -> StoredArray {
+    let count = |array: BodyArray| {
+        let each = match array.is_of_joints() {
+            true => frames.scalars.len(),
+            false => frames.bodies.len(),
+        };
+        (each * array.numbers()) as u32
+    };
+    let before = BodyArray::ALL.iter().take_while(|&&other| other != array);
+    StoredArray {
+        numbers: count(array),
+        from: StoredNumbers::Picked {
+            first: before.map(|&array| count(array)).sum(),
+            of_frames: !array.is_of_joints(),
+        },
+        needs_walk: !array.is_of_joints(),
+        needs_velocities: matches!(
+            array,
+            BodyArray::JointRates | BodyArray::Velocities | BodyArray::AngularVelocities
+        ),
     }
 }

@@ -8,7 +8,7 @@ use crate::shader::{
     FRAME_BALL, FRAME_FIXED, FRAME_FREE, FRAME_HINGE, FRAME_SLIDE, NO_FRAME, TreeFrame,
     VECTOR_WORDS,
 };
-use crate::twin::functions::turned;
+use crate::twin::functions::rotation_about;
 use crate::twin::quaternion::rotated;
 
 /// A frame in the world.
@@ -79,7 +79,7 @@ fn walk_to(
                 false => 0.0,
             };
             if frame.kind == FRAME_HINGE {
-                rotation = product(axes, turned(frame.axis, value));
+                rotation = product(axes, rotation_about(frame.axis, value));
                 angular = scaled(frame.axis, rate);
             } else {
                 arm = sum(arm, rotated(axes, scaled(frame.axis, value)));

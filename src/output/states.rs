@@ -5,11 +5,7 @@ use std::ops::Range;
 use crate::names::names;
 use crate::output::encoding::Encoding;
 use crate::output::pose_error::OFFSET_STEP;
-use crate::pose::tree::TreeFrames;
-use crate::shader::{
-    ANGULAR_VELOCITY, LOCAL_ROTATION, POSITION, STATE_VECTORS, VECTOR_WORDS, VELOCITY,
-    WORLD_ROTATION,
-};
+use crate::shader::{ANGULAR_VELOCITY, LOCAL_ROTATION, POSITION, VELOCITY, WORLD_ROTATION};
 
 /// An array of [`MotionStates`](crate::crowd::MotionStates).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -115,61 +111,6 @@ impl BodyArray {
     #[must_use]
     pub fn is_of_joints(self) -> bool {
         matches!(self, Self::JointValues | Self::JointRates)
-    }
-
-    /// The words of an instance's states that it has.
-    fn picks(self, frames: &TreeFrames) -> Vec<u32> {
-        let state = STATE_VECTORS * VECTOR_WORDS;
-        let vectors = |list: &[u32], vector: u32, components: &[u32]| {
-            let of = |frame: &u32| {
-                let first = frame * state + vector * VECTOR_WORDS;
-                components.iter().map(move |component| first + component)
-            };
-            list.iter().flat_map(of).collect()
-        };
-        match self {
-            Self::JointValues => frames.scalars.clone(),
-            Self::JointRates => {
-                let to_rate = (VELOCITY - POSITION) * VECTOR_WORDS;
-                frames.scalars.iter().map(|word| word + to_rate).collect()
-            }
-            Self::Positions => vectors(&frames.bodies, POSITION, &[0, 1, 2]),
-            Self::Rotations if frames.is_w_first => {
-                vectors(&frames.bodies, WORLD_ROTATION, &[3, 0, 1, 2])
-            }
-            Self::Rotations => vectors(&frames.bodies, WORLD_ROTATION, &[0, 1, 2, 3]),
-            Self::Velocities => vectors(&frames.points, VELOCITY, &[0, 1, 2]),
-            Self::AngularVelocities => vectors(&frames.bodies, ANGULAR_VELOCITY, &[0, 1, 2]),
-        }
-    }
-
-    /// The words of all arrays, one array after the other.
-    pub(crate) fn all_picks(frames: &TreeFrames) -> Vec<u32> {
-        Self::ALL.iter().flat_map(|it| it.picks(frames)).collect()
-    }
-
-    /// What a kernel stores of an instance; its words are among [`BodyArray::all_picks`].
-    pub(crate) fn stored(self, frames: &TreeFrames) -> StoredArray {
-        let count = |array: Self| {
-            let each = match array.is_of_joints() {
-                true => frames.scalars.len(),
-                false => frames.bodies.len(),
-            };
-            (each * array.numbers()) as u32
-        };
-        let before = Self::ALL.iter().take_while(|&&array| array != self);
-        StoredArray {
-            numbers: count(self),
-            from: StoredNumbers::Picked {
-                first: before.map(|&array| count(array)).sum(),
-                of_frames: !self.is_of_joints(),
-            },
-            needs_walk: !self.is_of_joints(),
-            needs_velocities: matches!(
-                self,
-                Self::JointRates | Self::Velocities | Self::AngularVelocities
-            ),
-        }
     }
 }
 

@@ -200,14 +200,17 @@ fn rotations_by_many_turns_are_as_accurate_as_those_by_small_angles() {
     let mut worst = 0.0f64;
     for step in -400_000..=400_000 {
         let angle = 4096.0 * (step as f32 / 400_000.0);
-        let [x, y, z, w] = cpu::turned([0.0, 1.0, 0.0], angle);
+        let [x, y, z, w] = cpu::rotation_about([0.0, 1.0, 0.0], angle);
         let (sine, cosine) = (0.5 * f64::from(angle)).sin_cos();
         worst = worst.max((f64::from(y) - sine).abs());
         worst = worst.max((f64::from(w) - cosine).abs());
         assert_eq!([x, z], [0.0; 2]);
     }
     assert!(worst < 1.2e-7, "{worst}");
-    assert_eq!(cpu::turned([1.0, 0.0, 0.0], 0.0), [0.0, 0.0, 0.0, 1.0]);
+    assert_eq!(
+        cpu::rotation_about([1.0, 0.0, 0.0], 0.0),
+        [0.0, 0.0, 0.0, 1.0]
+    );
 }
 
 // ---------------------------------------------------------------- arguments
@@ -400,8 +403,8 @@ functions! { on, r:
     "composed" of (small(r), small(r)) => |(a, b)|
         { let r = entries::composed(on, a, b); [r.vector[0], r.vector[1], r.vector[2], r.cosm1] },
         { let r = cpu::composed(a, b); [r.vector[0], r.vector[1], r.vector[2], r.cosm1] };
-    "turned" of (r.vector::<3>(), hinge_angle(r)) => |(axis, angle)|
-        entries::turned(on, axis, angle), cpu::turned(axis, angle);
+    "rotation_about" of (r.vector::<3>(), hinge_angle(r)) => |(axis, angle)|
+        entries::rotation_about(on, axis, angle), cpu::rotation_about(axis, angle);
     "inverse_rotated" of (r.vector::<3>(), small(r)) => |(v, r)|
         entries::inverse_rotated(on, v, r), cpu::inverse_rotated(v, r);
     "canonical_product" of (r.vector::<4>(), r.vector::<3>(), r.number()) => |(m, v, w)|

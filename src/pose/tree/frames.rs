@@ -225,7 +225,7 @@ impl Tree {
         for body in &self.bodies {
             let parent = body.parent.map(|parent| of_bodies[parent]);
             let above = parent.or(base).unwrap_or(NO_FRAME);
-            // What the next frame adds to the one above, and where that is in the axes of the body.
+            // The pose of the next frame in the one above, and the origin of that in the axes of the body.
             let (mut last, mut offset, mut rest) = (above, body.position, body.rotation);
             let mut origin = DVec3::ZERO;
             for (joint, value) in body.joints.iter().zip(&mut values) {

@@ -10,7 +10,7 @@ const QUARTER_2: f32 = 4.837512969970703e-4;
 const QUARTER_3: f32 = 7.549789948768648e-8;
 
 // The rotation by an angle, up to 8192 rad in magnitude, about a unit axis.
-fn turned(axis: vec3f, angle: f32) -> vec4f {
+fn rotation_about(axis: vec3f, angle: f32) -> vec4f {
     let half = angle * 0.5;
     let shifted = half * QUARTERS_PER_RADIAN + WHOLE_SHIFT;
     let quarters = bitcast<u32>(shifted);
