@@ -241,11 +241,14 @@ pub enum CrowdError {
     /// The result of the previous submission was not taken.
     #[error("the result of the submission before was not taken; call wait_into first")]
     StillSubmitted,
-    /// The engine does not use the Vulkan device of the buffer, or the target belongs to another crowd.
+    /// The engine does not use the Vulkan device of the buffer.
     #[error(
         "the crowd was not made by an engine on the buffer's Vulkan device; make it with Engine::from_vulkan"
     )]
     OtherDevice,
+    /// The target belongs to another crowd.
+    #[error("the target was made by another crowd; record it with that crowd, or make a target of this one")]
+    OtherCrowd,
     /// States cannot have rotations in this encoding.
     #[error(
         "states have rotations as f32, matrix or 6d, not as {encoding}; encode quaternions by Engine::encode"

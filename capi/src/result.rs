@@ -163,7 +163,8 @@ impl From<CrowdError> for Failure {
             | CrowdError::Seconds { .. }
             | CrowdError::EventTick { .. }
             | CrowdError::EventsSince { .. }
-            | CrowdError::OtherDevice => TumbleResult::InvalidArgument,
+            | CrowdError::OtherDevice
+            | CrowdError::OtherCrowd => TumbleResult::InvalidArgument,
             _ => TumbleResult::InvalidInput,
         };
         Self::new(code, crowd_words(&error))

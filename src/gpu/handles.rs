@@ -238,7 +238,7 @@ impl VulkanQueue {
 pub struct VulkanBuffer {
     /// The buffer.
     pub buffer: vk::Buffer,
-    /// The start of the range in bytes: a multiple of the size of a stored value.
+    /// The start of the range in bytes: a multiple of the size of a stored value, and for crowds, stages and passes of 256.
     pub offset: u64,
     /// The length of the range in bytes: at least the size of the result.
     pub size: u64,

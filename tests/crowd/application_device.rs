@@ -136,7 +136,7 @@ fn thrown_away_frames_are_told() {
     commands.recorded(|command_buffer| {
         // SAFETY: nothing is recorded.
         let refused = unsafe { other.record(&target, command_buffer) };
-        assert_eq!(refused.unwrap_err(), CrowdError::OtherDevice);
+        assert_eq!(refused.unwrap_err(), CrowdError::OtherCrowd);
     });
     let crowd = cpu().crowd(&library, 5, 1).unwrap();
     // SAFETY: nothing uses the buffer.

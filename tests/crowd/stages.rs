@@ -284,7 +284,7 @@ fn ranges_that_do_not_fit_a_stage_are_refused() {
             size,
             needed,
         };
-        assert_eq!((three, of_other), (small, CrowdError::OtherDevice));
+        assert_eq!((three, of_other), (small, CrowdError::OtherCrowd));
     });
 
     // Without inverse bind matrices.

@@ -141,9 +141,8 @@ impl Crowd {
         scopes: CommandScopes,
     ) -> Result<(), CrowdError> {
         let device = vulkan_crowd(self.device.as_deref());
-        let Some(device) = device.filter(|device| Arc::ptr_eq(device, &target.crowd)) else {
-            return Err(CrowdError::OtherDevice);
-        };
+        let device = device.filter(|device| Arc::ptr_eq(device, &target.crowd));
+        let device = device.ok_or(CrowdError::OtherCrowd)?;
         let instances = self.visible_count();
         if instances > target.room as usize {
             return Err(CrowdError::Buffer {
