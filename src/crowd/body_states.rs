@@ -19,9 +19,9 @@ use crate::threads::stop;
 
 /// The clips of a robot: [`MotionTables`] whose joints are tracks without parents, and the [`TreeFrames`] that follow them.
 ///
-/// The bodies are computed in f32, with the same bits on every machine and device. They are within 4e-7 m, half a step of
-/// f32 of their positions, and 1e-6 rad of those that [`Tree::motions`](crate::trees::Tree::motions) computes in f64 from the
-/// same joints, for robots that are about 1 m large.
+/// The bodies are computed in f32, with the same bits on every machine and device. For robots that are about 1 m large, they
+/// are within 1e-6 m and 2e-6 rad of those that [`Tree::motions`](crate::trees::Tree::motions) computes in f64 from the same
+/// joints; far from the origin, the root's position is rounded once.
 ///
 /// ```
 /// use tumble::glam::{DVec3, Quat, Vec3};
