@@ -291,7 +291,7 @@ fn frames_are_recorded_into_an_applications_commands() {
             fails(
                 refused,
                 TumbleResult::InvalidArgument,
-                "crowd was not made by an engine on",
+                "the target was made by another crowd",
             );
             let refused = tumble_crowd_record(recorded, targets[0], null_mut());
             fails(refused, TumbleResult::InvalidPointer, "`commands` is null");

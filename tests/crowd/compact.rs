@@ -54,62 +54,69 @@ fn library_of(
     library
 }
 
-/// At every vector width and on every device, with a kernel for each step and with one for whole instances; with one
-/// layer and with several, which fade; in 32 and in 16 bits.
+/// On the CPU at every vector width, and on every Vulkan device with a kernel for each step and with one for whole
+/// instances.
+fn engines() -> Vec<(String, Engine)> {
+    let widths = VectorWidth::available().into_iter().map(|width| {
+        let mut options = EngineOptions::default();
+        options.vector_width = Some(width);
+        let engine = Engine::with_options(Device::Cpu, &options).unwrap();
+        (format!("CPU, {width:?}"), engine)
+    });
+    let devices = vulkan_devices().into_iter().flat_map(|device| {
+        [Mapping::Runs, Mapping::Samples].map(|mapping| {
+            let mut options = EngineOptions::default();
+            options.mapping = mapping;
+            let engine = Engine::with_options(device.clone(), &options).unwrap();
+            let name = engine.device_name().to_owned();
+            (format!("{name}, {mapping:?}"), engine)
+        })
+    });
+    widths.chain(devices).collect()
+}
+
+/// Arcs and cubics in three layers, one of which fades, in 32 and in 16 bits.
 #[test]
 fn compact_libraries_have_the_bits_of_whole_ones() {
+    const JOINTS: usize = 18;
+    const LAYERS: usize = 3;
+    const INSTANCES: usize = 41;
+    let methods = [method::BESSEL_OVERHAUSER, method::SLERP];
+    let [whole, compact] = [CrowdStorage::Segments, CrowdStorage::Compact]
+        .map(|storage| library_of(storage, JOINTS, &methods, VectorMethod::Linear));
+    let [of_whole, of_compact] = [&whole, &compact].map(CrowdLibrary::bytes_per_key);
+    assert!(of_compact < 0.7 * of_whole, "{of_compact}, {of_whole}");
+    assert_eq!(compact.storage(), CrowdStorage::Compact);
     let mut random = Random(23);
-    for (joints, layers, methods, vectors) in [
-        (19, 1, &[method::SLERP][..], VectorMethod::Linear),
-        (
-            18,
-            3,
-            &[method::BESSEL_OVERHAUSER, method::SLERP, method::C2][..],
-            VectorMethod::CatmullRom,
-        ),
-    ] {
-        let [whole, compact] = [CrowdStorage::Segments, CrowdStorage::Compact]
-            .map(|storage| library_of(storage, joints, methods, vectors));
-        let [of_whole, of_compact] = [&whole, &compact].map(CrowdLibrary::bytes_per_key);
-        assert!(of_compact < 0.7 * of_whole, "{of_compact}, {of_whole}");
-        assert_eq!(compact.storage(), CrowdStorage::Compact);
-        const INSTANCES: usize = 41;
-        let plays: Vec<_> = (0..INSTANCES * layers)
-            .map(|slot| (slot / layers, slot % layers, layer(&mut random, &whole)))
-            .map(|(instance, index, plays)| (instance, index, plays.with_mask(None)))
-            .collect();
-        let mut expected_crowd = cpu().crowd(&whole, INSTANCES, layers).unwrap();
-        let mut all = crowds(&compact, INSTANCES, layers);
-        for (_, crowd) in &mut all {
-            crowd.set_all(&plays).unwrap();
-        }
-        expected_crowd.set_all(&plays).unwrap();
-        for (step, ticks) in [0, 11_760, 1 << 33].into_iter().enumerate() {
-            let moved = |crowd: &mut Crowd| {
-                crowd.advance_ticks(ticks).unwrap();
-                if layers > 1 && step == 1 {
-                    crowd.fade(3, 1, 0.5, 1 << 34).unwrap();
-                }
-            };
-            moved(&mut expected_crowd);
-            let expected = ALL.map(|values| bits(&evaluated(&mut expected_crowd, values)));
-            let mut half = vec![[0; 4]; expected_crowd.output_len(CrowdValues::Model)];
-            expected_crowd
-                .evaluate_half_into(CrowdValues::Model, &mut half)
-                .unwrap();
-            for (name, crowd) in &mut all {
-                moved(crowd);
-                for (values, expected) in ALL.into_iter().zip(&expected) {
-                    let found = bits(&evaluated(crowd, values));
-                    let first = found.iter().zip(expected).position(|(a, b)| a != b);
-                    assert_eq!(first, None, "{name}, {values:?}, {methods:?}, step {step}");
-                }
-                let mut found = vec![[0; 4]; half.len()];
-                crowd
-                    .evaluate_half_into(CrowdValues::Model, &mut found)
-                    .unwrap();
-                assert!(found == half, "{name}, 16 bits");
+    let plays: Vec<_> = (0..INSTANCES * LAYERS)
+        .map(|slot| (slot / LAYERS, slot % LAYERS, layer(&mut random, &compact)))
+        .map(|(instance, index, plays)| {
+            let mask = plays.mask.map(|_| 0);
+            (instance, index, plays.with_mask(mask))
+        })
+        .collect();
+    // All values at some times.
+    let evaluate = |mut crowd: Crowd| {
+        crowd.set_all(&plays).unwrap();
+        let mut found = Vec::new();
+        for ticks in [0, 11_760, 1 << 33] {
+            crowd.advance_ticks(ticks).unwrap();
+            for values in ALL {
+                found.push(bits(&evaluated(&mut crowd, values)));
+                let mut half = vec![[0; 4]; crowd.output_len(values)];
+                crowd.evaluate_half_into(values, &mut half).unwrap();
+                found.push(half.iter().map(|value| value.map(u32::from)).collect());
             }
+            crowd.fade(3, 1, 0.5, 1 << 34).unwrap();
+        }
+        found
+    };
+    let expected = evaluate(cpu().crowd(&whole, INSTANCES, LAYERS).unwrap());
+    for (name, engine) in engines() {
+        let found = evaluate(engine.crowd(&compact, INSTANCES, LAYERS).unwrap());
+        for (index, (found, expected)) in found.iter().zip(&expected).enumerate() {
+            let first = found.iter().zip(expected).position(|(a, b)| a != b);
+            assert_eq!(first, None, "{name}, result {index}");
         }
     }
 }
