@@ -141,7 +141,11 @@ fn the_plots_of_the_gallery_are_those_of_the_commands() {
     copy_data(folder.path());
     let mut plots = 0;
     for command in page.lines().filter_map(|line| line.strip_prefix("tumble ")) {
-        let Some(picture) = command.split(" -o ").nth(1).filter(|it| it.ends_with(".svg")) else {
+        let Some(picture) = command
+            .split(" -o ")
+            .nth(1)
+            .filter(|it| it.ends_with(".svg"))
+        else {
             continue;
         };
         let words: Vec<&str> = command.split_whitespace().collect();
