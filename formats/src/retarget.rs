@@ -626,6 +626,33 @@ fn axes_of(rig: &Rig<'_>, roles: &Roles) -> Option<DQuat> {
     (up.dot(left) == 0.0).then(|| DQuat::from_mat3(&DMat3::from_cols(left, up, left.cross(up))))
 }
 
+/// The limb, or the trunk, whose direction at rest is furthest from that in a T-pose with y up that faces z, without the
+/// rotations of the joints at rest: its first and its last joint, and the angle in degrees.
+#[must_use]
+pub fn furthest_from_t_pose(clip: &Motion, roles: &Roles) -> Option<([usize; 2], f64)> {
+    let limbs = [
+        (Role::Hips, Role::Head, DVec3::Y),
+        (Role::LeftUpperArm, Role::LeftHand, DVec3::X),
+        (Role::RightUpperArm, Role::RightHand, DVec3::NEG_X),
+        (Role::LeftUpperLeg, Role::LeftFoot, DVec3::NEG_Y),
+        (Role::RightUpperLeg, Role::RightFoot, DVec3::NEG_Y),
+    ];
+    let angles = limbs.into_iter().filter_map(|(first, last, expected)| {
+        let (first, last) = (roles.joint(first)?, roles.joint(last)?);
+        let (mut joint, mut along) = (last, DVec3::ZERO);
+        for _ in 0..clip.skeleton.len() {
+            if joint == first {
+                break;
+            }
+            along += clip.rest_position(joint);
+            joint = clip.skeleton.get(joint)?.parent?;
+        }
+        let angle = libm::atan2(along.cross(expected).length(), along.dot(expected));
+        Some(([first, last], angle.to_degrees()))
+    });
+    angles.max_by(|(_, one), (_, other)| one.total_cmp(other))
+}
+
 /// Which joint follows which.
 struct Pairs {
     /// The joint of the source for each joint of the target.

@@ -15,7 +15,9 @@ use tumble_formats::learning::{
 };
 use tumble_formats::motion::{Joint, Motion};
 use tumble_formats::printable::printable;
-use tumble_formats::retarget::{Role, Roles, missing_text, recognise, standing_axis};
+use tumble_formats::retarget::{
+    Role, Roles, furthest_from_t_pose, missing_text, recognise, standing_axis,
+};
 use tumble_formats::robot::{
     BodiesError, BodiesRequest, LimitRule, Robot, VelocityPoint, VelocitySource, bodies,
 };
@@ -214,33 +216,15 @@ fn check_rest(name: &str, clip: &Motion, roles: &Roles) -> Result<(), Failure> {
         let joint = clip.set.track_name(joint);
         return refused(format!("here `{}` is rotated at rest", printable(&joint)));
     }
-    for (role, end, direction) in [
-        (Role::Hips, Role::Head, DVec3::Y),
-        (Role::LeftUpperArm, Role::LeftHand, DVec3::X),
-        (Role::RightUpperArm, Role::RightHand, DVec3::NEG_X),
-        (Role::LeftUpperLeg, Role::LeftFoot, DVec3::NEG_Y),
-        (Role::RightUpperLeg, Role::RightFoot, DVec3::NEG_Y),
-    ] {
-        let (Some(first), Some(mut joint)) = (roles.joint(role), roles.joint(end)) else {
-            continue;
-        };
-        let mut along = DVec3::ZERO;
-        while joint != first
-            && let Some(parent) = clip.skeleton[joint].parent
-        {
-            along += clip.rest_position(joint);
-            joint = parent;
-        }
-        let apart = along.angle_between(direction).to_degrees();
-        if apart > T_POSE {
-            let (first, end) = (clip.set.track_name(first), roles.joint(end));
-            let end = clip.set.track_name(end.unwrap_or_default());
-            return refused(format!(
-                "here the direction from `{}` to `{}` is {apart:.0}° away from that at rest",
-                printable(&first),
-                printable(&end)
-            ));
-        }
+    if let Some(([first, last], apart)) = furthest_from_t_pose(clip, roles)
+        && apart > T_POSE
+    {
+        let [first, last] = [first, last].map(|joint| clip.set.track_name(joint));
+        return refused(format!(
+            "here the direction from `{}` to `{}` is {apart:.0}° away from that at rest",
+            printable(&first),
+            printable(&last)
+        ));
     }
     Ok(())
 }
@@ -248,7 +232,7 @@ fn check_rest(name: &str, clip: &Motion, roles: &Roles) -> Result<(), Failure> {
 /// How far the limbs of a T-pose are from the axes at most, in degrees; legs are often apart.
 const T_POSE: f64 = 30.0;
 
-/// What a set of features measures from the ground.
+/// Whether a set of features depends on what points up.
 fn depends_on_ground(set: FeatureSet) -> bool {
     matches!(
         set,

@@ -179,7 +179,7 @@ fn object(members: &JsonMembers<'_>, others: &[(&str, String)]) -> String {
     format!("{{{}}}", members.join(","))
 }
 
-/// What becomes of channels that only repeat the rest pose.
+/// The treatment of channels that only repeat the rest pose.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum AtRest {
     LeftOut,
