@@ -1,4 +1,5 @@
 // Stores the matrix of a rotation of every joint's state, or the first six numbers of it.
+// Twin: src/twin/matrix.rs.
 
 @group(0) @binding(0) var<storage, read> states: array<vec4f>;
 @group(0) @binding(1) var<storage, read_write> values: array<f32>;

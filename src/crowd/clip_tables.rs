@@ -250,9 +250,9 @@ fn curve_of_keys(
     }
     let whole = TrackCopy::of_track(0..0);
     let parts = data.parts_in(0, &whole);
-    let most = parts.map(|it| it.part.spans.len() + 2).sum();
-    curve.spans.reserve(most);
-    curve.constants.reserve(most);
+    let room = parts.map(|it| it.part.spans.len() + 2).sum();
+    curve.spans.reserve(room);
+    curve.constants.reserve(room);
     let mut are_keys = true;
     // The key at the end of the span before.
     let mut end: Option<[f32; 4]> = None;

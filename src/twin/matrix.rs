@@ -1,5 +1,5 @@
 //! Matrices, of `shaders/math/matrix.wgsl`, and their stores: `shaders/stores/matrix3x3.wgsl`,
-//! `shaders/stores/matrix3x4.wgsl` and `shaders/stores/six_d.wgsl`.
+//! `shaders/stores/matrix3x4.wgsl`, `shaders/stores/six_d.wgsl` and `shaders/motion/matrices.wgsl`.
 
 use crate::math::canonical::canonical;
 pub(crate) use crate::twin::functions::{MatrixRows, matrix_rows};
