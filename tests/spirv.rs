@@ -165,7 +165,13 @@ fn the_pass_changes_nothing_the_second_time_and_can_be_undone() {
         assert_eq!(no_contraction(&passed).unwrap(), passed, "{name}");
         let bare = without_decorations(&passed).unwrap();
         // These copy words.
-        let has_floats = !["crowd_gather", "crowd_scatter", "motion_store", "motion_pick"].contains(&name);
+        let has_floats = ![
+            "crowd_gather",
+            "crowd_scatter",
+            "motion_store",
+            "motion_pick",
+        ]
+        .contains(&name);
         assert_eq!(bare.len() < passed.len(), has_floats, "{name}");
         assert_eq!(no_contraction(&bare).unwrap(), passed, "{name}");
     }
