@@ -862,7 +862,7 @@ const _: () = {
 pub(crate) struct TreeFrame {
 /// The position in the frame above.
     pub(crate) offset: [f32; 3],
-/// The index of the frame above, or NO_FRAME.
+/// The index of the frame above, or `NO_FRAME`.
     pub(crate) above: u32,
 /// The rotation in the frame above, before the joint moves it.
     pub(crate) rest: [f32; 4],
@@ -873,7 +873,7 @@ pub(crate) struct TreeFrame {
 /// Where the states of a sample's tracks have its motion, in words: the coordinate of a hinge or a slide, else the
 /// first word of its track.
     pub(crate) source: u32,
-/// The first word of the track whose position is added last, or NO_FRAME.
+/// The first word of the track whose position is added last, or `NO_FRAME`.
     pub(crate) root: u32,
 /// A hinge turns by `multiplier * coordinate + shift`, a slide is moved so far.
     pub(crate) multiplier: f32,

@@ -6,7 +6,7 @@
 struct TreeFrame {
     /// The position in the frame above.
     offset: vec3f,
-    /// The index of the frame above, or NO_FRAME.
+    /// The index of the frame above, or `NO_FRAME`.
     above: u32,
     /// The rotation in the frame above, before the joint moves it.
     rest: vec4f,
@@ -17,7 +17,7 @@ struct TreeFrame {
     /// Where the states of a sample's tracks have its motion, in words: the coordinate of a hinge or a slide, else the
     /// first word of its track.
     source: u32,
-    /// The first word of the track whose position is added last, or NO_FRAME.
+    /// The first word of the track whose position is added last, or `NO_FRAME`.
     root: u32,
     /// A hinge turns by `multiplier * coordinate + shift`, a slide is moved so far.
     multiplier: f32,

@@ -57,11 +57,12 @@ fn robot(random: &mut Random) -> Tree {
 }
 
 fn joint_tracks() -> JointTracks {
-    let mut tracks = JointTracks::default();
-    tracks.free = vec![0];
-    tracks.balls = vec![1];
-    tracks.scalars = vec![[2, 0], [2, 1], [2, 2]];
-    tracks
+    JointTracks {
+        base: None,
+        free: vec![0],
+        balls: vec![1],
+        scalars: vec![[2, 0], [2, 1], [2, 2]],
+    }
 }
 
 fn frames(tree: &Tree, centres: bool, is_w_first: bool) -> TreeFrames {

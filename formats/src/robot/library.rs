@@ -89,14 +89,15 @@ impl<'a> RobotTracks<'a> {
         let counts = self.tree.counts();
         let first = u32::from(self.has_base);
         let mut next = first..;
-        let mut tracks = JointTracks::default();
-        tracks.base = self.has_base.then_some(0);
-        tracks.free = next.by_ref().take(counts.free).collect();
-        tracks.balls = next.by_ref().take(counts.balls).collect();
         let of_scalars = self.moving.len() as u32;
         let scalar =
             |[track, coordinate]: [usize; 2]| [of_scalars + track as u32, coordinate as u32];
-        tracks.scalars = self.scalars.coordinates().map(scalar).collect();
+        let tracks = JointTracks {
+            base: self.has_base.then_some(0),
+            free: next.by_ref().take(counts.free).collect(),
+            balls: next.by_ref().take(counts.balls).collect(),
+            scalars: self.scalars.coordinates().map(scalar).collect(),
+        };
         self.tree.frames(&tracks, bodies, points)
     }
 
