@@ -423,7 +423,7 @@ const WHOLE_MATRICES: [&str; 5] = [
 const WHOLE_CUBIC: [&str; 1] = ["crowd/cubic_or_constant"];
 
 /// Kernels over whole instances, for cards, each with the files that it needs beside those that it shares.
-const CROWD_WHOLE: [(&str, &[&[&str]]); 6] = [
+const CROWD_WHOLE: [(&str, &[&[&str]]); 5] = [
     (
         "whole_rotations",
         &[&CHANNELS, &["crowd/layers", "crowd/whole_rotations"]],
@@ -446,10 +446,6 @@ const CROWD_WHOLE: [(&str, &[&[&str]]); 6] = [
             &COMPACT_CHANNELS,
             &["crowd/layers", "crowd/whole_rotations"],
         ],
-    ),
-    (
-        "compact_whole_matrices",
-        &[&COMPACT_CHANNELS, &["crowd/layers"], &WHOLE_MATRICES],
     ),
 ];
 

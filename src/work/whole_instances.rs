@@ -61,7 +61,8 @@ impl WholeInstances {
                 (true, Compact) => Kernel::CrowdCompactWholeRotations,
                 (false, Plain) => Kernel::CrowdPlainWholeMatrices,
                 (false, Any) => Kernel::CrowdWholeMatrices,
-                (false, Compact) => Kernel::CrowdCompactWholeMatrices,
+                // It would need 256 registers on AMD's processors: its steps have kernels each.
+                (false, Compact) => return None,
             },
             output,
             instances,

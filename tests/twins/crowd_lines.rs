@@ -157,7 +157,10 @@ fn whole_instances_store_whole_lines() {
         (60, SLERP, 1, CrowdStorage::Compact),
     ] {
         let library = library(joints, method, storage);
-        for values in CrowdValues::ALL {
+        // There is no such kernel for the matrices of compact clips.
+        let is_compact = storage == CrowdStorage::Compact;
+        let all = CrowdValues::ALL.into_iter();
+        for values in all.filter(|values| !is_compact || *values == CrowdValues::Rotations) {
             for output in [CrowdOutput::from(values), CrowdOutput::half(values)] {
                 let kernel = assert_stores_whole_lines(&library, layers, output, None);
                 kernels.push(kernel as usize);
@@ -170,7 +173,6 @@ fn whole_instances_store_whole_lines() {
         Kernel::CrowdWholeMatrices,
         Kernel::CrowdPlainWholeMatrices,
         Kernel::CrowdCompactWholeRotations,
-        Kernel::CrowdCompactWholeMatrices,
     ];
     assert!(
         all.iter()

@@ -137,7 +137,6 @@ pub(crate) fn trials(kernel: Kernel, random: &mut Random) -> Vec<Trial> {
         | Kernel::CrowdWholeMatrices
         | Kernel::CrowdPlainWholeMatrices
         | Kernel::CrowdCompactWholeRotations
-        | Kernel::CrowdCompactWholeMatrices
         | Kernel::CrowdSubgroupRotations
         | Kernel::CrowdSubgroupRotationsF16 => whole_instances::trials(kernel, random),
         Kernel::MotionJoints

@@ -40,9 +40,7 @@ pub(super) fn trials(kernel: Kernel, random: &mut Random) -> Vec<Trial> {
     }
     let curves = match kernel {
         Kernel::CrowdPlainWholeRotations | Kernel::CrowdPlainWholeMatrices => CrowdCurves::Plain,
-        Kernel::CrowdCompactWholeRotations | Kernel::CrowdCompactWholeMatrices => {
-            CrowdCurves::Compact
-        }
+        Kernel::CrowdCompactWholeRotations => CrowdCurves::Compact,
         _ => CrowdCurves::Any,
     };
     let outputs = match kernel {
