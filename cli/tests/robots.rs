@@ -188,10 +188,18 @@ fn files_of_protomotions_are_archives_of_torch() {
     expected.extend(data);
     expected.push("archive/version");
     assert_eq!(names, expected);
-    assert_eq!((&*members[1].1, &*members[8].1), (&b"little"[..], &b"3\n"[..]));
+    assert_eq!(
+        (&*members[1].1, &*members[8].1),
+        (&b"little"[..], &b"3\n"[..])
+    );
     let pickle = String::from_utf8_lossy(&members[0].1);
     assert!(members[0].1.starts_with(b"\x80\x02}("));
-    assert_eq!(pickle.matches("ctorch._utils\n_rebuild_tensor_v2\n").count(), 6);
+    assert_eq!(
+        pickle
+            .matches("ctorch._utils\n_rebuild_tensor_v2\n")
+            .count(),
+        6
+    );
     assert_eq!(pickle.matches("ctorch\nFloatStorage\n").count(), 6);
     // Of rotations: 31 frames, 5 bodies, four numbers, the last one nearest in memory.
     let int = |number: i32| [&b"J"[..], &number.to_le_bytes()].concat();
@@ -209,9 +217,16 @@ fn files_of_protomotions_are_archives_of_torch() {
         b"\x89ccollections\nOrderedDict\n)RtR".to_vec(),
     ];
     let (rotations, pickle) = (rotations.concat(), &members[0].1);
-    assert!(pickle.windows(rotations.len()).any(|part| part == rotations));
+    assert!(
+        pickle
+            .windows(rotations.len())
+            .any(|part| part == rotations)
+    );
     let contents = Contents::open(&path, &ReadOptions::default()).unwrap();
-    let found = contents.entries().into_iter().map(|entry| (entry.name, entry.kind));
+    let found = contents
+        .entries()
+        .into_iter()
+        .map(|entry| (entry.name, entry.kind));
     let found: HashMap<String, String> = found.collect();
     for (name, kind) in [
         ("fps", "() i8"),
@@ -233,7 +248,9 @@ fn files_of_protomotions_are_archives_of_torch() {
     assert_eq!(stored("dof_vel"), mjlab["joint_vel"]);
     assert_eq!(stored("rigid_body_vel"), mjlab["body_lin_vel_w"]);
     assert_eq!(stored("rigid_body_ang_vel"), mjlab["body_ang_vel_w"]);
-    let first = mjlab["body_quat_w"].chunks(4).flat_map(|q| [q[1], q[2], q[3], q[0]]);
+    let first = mjlab["body_quat_w"]
+        .chunks(4)
+        .flat_map(|q| [q[1], q[2], q[3], q[0]]);
     assert_eq!(stored("rigid_body_rot"), first.collect::<Vec<f64>>());
 }
 
@@ -255,7 +272,10 @@ fn clips_of_libraries_have_the_name_of_their_file() {
     line(folder, &format!("eval takes --fps 30 {convert} out"));
     assert_eq!(clip("out/dance.pkl"), "dance");
     // A name in the input is kept.
-    line(folder, &format!("convert walk01.v2.pkl {convert} again.pkl"));
+    line(
+        folder,
+        &format!("convert walk01.v2.pkl {convert} again.pkl"),
+    );
     assert_eq!(clip("again.pkl"), "walk01");
 }
 
@@ -297,17 +317,29 @@ fn fixed_links_are_merged_as_simulators_do() {
     let merged = report("beyondmimic -o merged.npz");
     let bodies = serde_json::json!(["base", "right", "left", "elbow"]);
     assert_eq!(merged["bodies"], bodies);
-    assert_eq!(merged["merged_bodies"], serde_json::json!(["sensor", "plate"]));
+    assert_eq!(
+        merged["merged_bodies"],
+        serde_json::json!(["sensor", "plate"])
+    );
     let joints = serde_json::json!(["right_joint", "left_joint", "elbow_joint"]);
     assert_eq!(merged["joints"], joints);
     // The centre of mass of `right` and `plate` is at (0, 3 · 0.1, 0.1 + 3 · 0.5) / 4 = (0, 0.075, 0.4).
     let found = arrays(&folder.join("merged.npz"));
     let first = &found["body_lin_vel_w"][3..6];
-    assert!(largest_difference(first, &[0.8, 0.0, 0.0]) < 1e-6, "{first:?}");
+    assert!(
+        largest_difference(first, &[0.8, 0.0, 0.0]) < 1e-6,
+        "{first:?}"
+    );
     let elbow = &found["body_pos_w"][9..12];
-    assert!(largest_difference(elbow, &[0.0, 0.0, 1.5]) < 1e-6, "{elbow:?}");
+    assert!(
+        largest_difference(elbow, &[0.0, 0.0, 1.5]) < 1e-6,
+        "{elbow:?}"
+    );
     // A file of these bodies is read with the robot of all links, and its order is found.
-    line(folder, "convert merged.npz --robot arm.urdf --dialect unitree-csv -o back.csv");
+    line(
+        folder,
+        "convert merged.npz --robot arm.urdf --dialect unitree-csv -o back.csv",
+    );
     let [found, expected] = ["back.csv", "take.csv"].map(|file| numbers(&folder.join(file)));
     assert!(largest_difference(&found, &expected) < 1e-6);
     // Kept links without mass have the velocity of their origin.

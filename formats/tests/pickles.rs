@@ -281,7 +281,11 @@ fn dicts_with_defaults_are_dicts_and_classes_have_their_names() {
         assert_eq!(entries, [("k".to_owned(), "() f8".to_owned())], "{class}");
         assert_eq!(contents.numbers("k").unwrap().values, [2.5]);
     }
-    let called = Contents::read("a", b"c__builtin__\nint\n(S'1'\ntR.".to_vec(), Limits::default());
+    let called = Contents::read(
+        "a",
+        b"c__builtin__\nint\n(S'1'\ntR.".to_vec(),
+        Limits::default(),
+    );
     assert_eq!(called.err().unwrap().code, Code::PickleForm);
     let class = "protomotions.simulator.base_simulator.simulator_state\nStateConversion";
     let file = dict("state", format!("c{class}\n(S'common'\ntR").as_bytes());

@@ -14,8 +14,8 @@ use tumble::trees::{
 use tumble::{Quantity, TrackSet};
 use tumble_formats::motion::Motion;
 use tumble_formats::robot::{
-    self, BodiesError, BodiesRequest, FixedBodies, LimitExcess, LimitRule, VelocityPoint, VelocitySource,
-    unwrap_joint,
+    self, BodiesError, BodiesRequest, FixedBodies, LimitExcess, LimitRule, VelocityPoint,
+    VelocitySource, unwrap_joint,
 };
 
 use crate::arrays::{ArrayValues, Order, doubles, quaternions};
@@ -404,11 +404,7 @@ impl ConfigurationArrays {
         }
     }
 
-    fn rotations(
-        &self,
-        of: &Option<JointArray>,
-        sample: usize,
-    ) -> impl Iterator<Item = DQuat> {
+    fn rotations(&self, of: &Option<JointArray>, sample: usize) -> impl Iterator<Item = DQuat> {
         let order = self.quaternions;
         of.iter().flat_map(move |of| of.rotations(sample, order))
     }

@@ -29,10 +29,7 @@ pub(in crate::pickle) fn is_archive(start: &[u8]) -> bool {
 }
 
 /// Refuses a file of `PyTorch` that is no archive.
-pub(in crate::pickle) fn refuse_other_files(
-    file: &str,
-    bytes: &[u8],
-) -> Result<(), Diagnostic> {
+pub(in crate::pickle) fn refuse_other_files(file: &str, bytes: &[u8]) -> Result<(), Diagnostic> {
     if !bytes.starts_with(NO_ARCHIVE) {
         return Ok(());
     }
