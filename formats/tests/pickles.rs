@@ -271,7 +271,7 @@ fn names_that_python_would_run_are_refused() {
 /// those of `PyTorch`, have their type.
 #[test]
 fn dicts_with_defaults_are_dicts_and_classes_have_their_names() {
-    for class in ["list", "int", "unicode"] {
+    for class in ["list", "int", "long", "unicode"] {
         let call = format!("ccollections\ndefaultdict\n(c__builtin__\n{class}\ntRX\x01\0\0\0kG");
         let file = [call.as_bytes(), &2.5f64.to_be_bytes(), b"s."].concat();
         let contents = Contents::read("a", file, Limits::default()).unwrap();
