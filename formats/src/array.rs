@@ -392,6 +392,7 @@ mod tests {
             (Element::F32, vec![4, 121, 4]),
             (Element::Unicode(5), vec![]),
             (Element::Unsigned(1), vec![7]),
+            (Element::Bool, vec![2, 3]),
         ] {
             let bytes = ArrayHeader::write(&element, &shape);
             assert_eq!(bytes.len() % 64, 0);

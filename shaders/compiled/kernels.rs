@@ -1048,7 +1048,6 @@ pub(crate) enum Kernel {
     CrowdWholeMatrices,
     CrowdPlainWholeMatrices,
     CrowdCompactWholeRotations,
-    CrowdCompactWholeMatrices,
     CrowdSubgroupRotations,
     CrowdSubgroupRotationsF16,
     MotionJoints,
@@ -1217,7 +1216,7 @@ impl Kernel {
         }
     }
 }
-pub(crate) static KERNELS: [KernelCode; 165] = [
+pub(crate) static KERNELS: [KernelCode; 164] = [
     KernelCode { kernel: Kernel::SelfTest, storage: ("self_test", 1946), texels: None, converting: None, bindings: &[Read, Write], segments: None, subgroups: false },
     KernelCode { kernel: Kernel::ArcFramesAxisAngle, storage: ("arc_frames_axis_angle", 2963), texels: Some(("arc_frames_axis_angle_texels", 3089)), converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::Frames, Store::AxisAngle)), subgroups: false },
     KernelCode { kernel: Kernel::ArcFramesEuler, storage: ("arc_frames_euler", 3619), texels: Some(("arc_frames_euler_texels", 3737)), converting: None, bindings: &[Read, Read, Read, Write], segments: Some((Form::Arc, List::Frames, Store::Euler)), subgroups: false },
@@ -1372,7 +1371,6 @@ pub(crate) static KERNELS: [KernelCode; 165] = [
     KernelCode { kernel: Kernel::CrowdWholeMatrices, storage: ("crowd_whole_matrices", 10662), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Read, Read, Read, Read, Write, Write], segments: None, subgroups: false },
     KernelCode { kernel: Kernel::CrowdPlainWholeMatrices, storage: ("crowd_plain_whole_matrices", 7321), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Read, Read, Read, Read, Write, Write], segments: None, subgroups: false },
     KernelCode { kernel: Kernel::CrowdCompactWholeRotations, storage: ("crowd_compact_whole_rotations", 14552), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Read, Read, Write, Write], segments: None, subgroups: false },
-    KernelCode { kernel: Kernel::CrowdCompactWholeMatrices, storage: ("crowd_compact_whole_matrices", 16575), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Read, Read, Read, Read, Write, Write], segments: None, subgroups: false },
     KernelCode { kernel: Kernel::CrowdSubgroupRotations, storage: ("crowd_subgroup_rotations", 4538), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Read, Read, Write], segments: None, subgroups: true },
     KernelCode { kernel: Kernel::CrowdSubgroupRotationsF16, storage: ("crowd_subgroup_rotations_f16", 4786), texels: None, converting: Some(("crowd_subgroup_rotations_f16_converting", 4619)), bindings: &[Read, Read, Read, Read, Read, Read, Write], segments: None, subgroups: true },
     KernelCode { kernel: Kernel::MotionJoints, storage: ("motion_joints", 8606), texels: None, converting: None, bindings: &[Read, Read, Read, Read, Read, Read, Write], segments: None, subgroups: false },

@@ -105,6 +105,7 @@ const KNOWN: &[(&[&str], &str, Global)] = &[
     (BUILTINS, "object", Global::Object),
     // What a `defaultdict` calls for keys that it does not have.
     (BUILTINS, "int", Global::Type("int")),
+    (BUILTINS, "long", Global::Type("long")),
     (BUILTINS, "float", Global::Type("float")),
     (BUILTINS, "bool", Global::Type("bool")),
     (BUILTINS, "str", Global::Type("str")),
