@@ -286,11 +286,7 @@ fn dicts_with_defaults_are_dicts_and_classes_have_their_names() {
         b"c__builtin__\nint\n(S'1'\ntR.".to_vec(),
         Limits::default(),
     );
-<<<<<<< HEAD
-    assert_eq!(called.err().unwrap().code, Code::PickleForm);
-=======
     assert_eq!(called.err().unwrap().code, Code::PickleDamaged);
->>>>>>> 2cec0fc26182bf0e6281e7f9059d368df5435489
     let class = "protomotions.simulator.base_simulator.simulator_state\nStateConversion";
     let file = dict("state", format!("c{class}\n(S'common'\ntR").as_bytes());
     let contents = Contents::read("a", file, Limits::default()).unwrap();
