@@ -191,7 +191,7 @@ fn mirror_state(states: &mut MotionStates<'_>, at: Range<usize>, axis: usize, pa
     let of_rotation = |row| mirrored_rotation(rotation(row), axis).as_quat().to_array();
     for rotations in [&mut states.rotations, &mut states.world_rotations] {
         each(rotations, at.clone(), |rows| {
-            exchanged(rows, pairs, of_rotation)
+            exchanged(rows, pairs, of_rotation);
         });
     }
     for vectors in [&mut states.positions, &mut states.velocities] {
@@ -232,11 +232,11 @@ fn to_frame(
             *row = frame.vector(point(*row)).as_vec3().to_array();
         }
     };
-    each(&mut states.world_rotations, at.clone(), |rows| {
+    each(states.world_rotations, at.clone(), |rows| {
         rows.iter_mut().for_each(of_rotation);
     });
     // Those of other joints are relative to their parents, which the frame does not change.
-    each(&mut states.rotations, at.clone(), |rows| {
+    each(states.rotations, at.clone(), |rows| {
         for state in rows.chunks_mut(parents.len()) {
             let roots = state
                 .iter_mut()
@@ -245,11 +245,11 @@ fn to_frame(
             roots.for_each(|(row, _)| of_rotation(row));
         }
     });
-    each(&mut states.positions, at.clone(), |rows| {
+    each(states.positions, at.clone(), |rows| {
         for row in rows {
             *row = frame.position(point(*row)).as_vec3().to_array();
         }
     });
-    each(&mut states.velocities, at.clone(), of_vectors);
-    each(&mut states.angular_velocities, at, of_vectors);
+    each(states.velocities, at.clone(), of_vectors);
+    each(states.angular_velocities, at, of_vectors);
 }
