@@ -247,7 +247,9 @@ pub enum CrowdError {
     )]
     OtherDevice,
     /// The target belongs to another crowd.
-    #[error("the target was made by another crowd; record it with that crowd, or make a target of this one")]
+    #[error(
+        "the target was made by another crowd; record it with that crowd, or make a target of this one"
+    )]
     OtherCrowd,
     /// States cannot have rotations in this encoding.
     #[error(

@@ -76,9 +76,9 @@ pub use crate::feature::Feature;
 pub use crate::format::{Format, Loaded, ReadOptions};
 pub use crate::limits::Limits;
 pub use crate::motion::{
-    adjust, carried_mesh, collapse, compare, crowd_library, end_frame, join, keyed, keys, origin, outside, packed,
-    poses, reduce, retime, root_motion, sample, scalars, signs, skeleton, smooth, trajectory, trim,
-    world,
+    adjust, carried_mesh, collapse, compare, crowd_library, end_frame, join, keyed, keys, origin,
+    outside, packed, poses, reduce, retime, root_motion, sample, scalars, signs, skeleton, smooth,
+    trajectory, trim, world,
 };
 use crate::path::PathFormat;
 pub use crate::source::file_kind;

@@ -52,10 +52,13 @@ fn columns_hold_rotation_vectors_angles_and_matrices() {
 #[test]
 fn headings_without_names_are_told_apart_from_other_names() {
     for (text, words) in [
-        ("t;x;y;z;w\n0;0;0;0;1\n", "columns are separated by commas"),
+        (
+            "t;x;y;z;w\n0;0;0;0;1\n",
+            "columns must be separated by commas",
+        ),
         (
             "t\tx\ty\tz\tw\n0\t0\t0\t0\t1\n",
-            "columns are separated by commas",
+            "columns must be separated by commas",
         ),
         (
             "0,0,0,0,1\n1,0,0,0,1\n",

@@ -108,7 +108,7 @@ const SLIGHT: f32 = 1.001;
 
 /// Mistakes that change no bit of a result: the function, the beginning of the text, the factor of a constant that does
 /// change one, and why.
-const WITHOUT_EFFECT: [(&str, &str, Option<f32>, &str); 4] = [
+const WITHOUT_EFFECT: [(&str, &str, Option<f32>, &str); 6] = [
     (
         "acute_arc_tangent",
         "M::F::of(1.0)",
@@ -132,6 +132,18 @@ const WITHOUT_EFFECT: [(&str, &str, Option<f32>, &str); 4] = [
         "M::F::of(LONGEST_STEP)",
         Some(0.1),
         "SMALL_SQUARED_EXTENT is reached first",
+    ),
+    (
+        "authored_key",
+        "M::F::of(LONGEST_KEY)",
+        Some(0.1),
+        "stored keys are 1 or 4 long",
+    ),
+    (
+        "continued_key",
+        "M::F::of(LONGEST_KEY)",
+        Some(0.1),
+        "stored keys are 1 or 4 long",
     ),
 ];
 
