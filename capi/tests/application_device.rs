@@ -852,8 +852,8 @@ fn record_at_new_times(
         fails(two, TumbleResult::InvalidInput, "2");
         let infinite = record(commands, 0, &[f64::INFINITY]);
         fails(infinite, TumbleResult::InvalidInput, "inf");
-        let beyond = record(commands, 3 * size, &[0.0]);
-        fails(beyond, TumbleResult::WrongSize, "does not fit");
+        let too_late = record(commands, 3 * size, &[0.0]);
+        fails(too_late, TumbleResult::WrongSize, "does not fit");
         for (frame, time) in (0_u64..).zip(times) {
             done(record(commands, frame * size, &[time]));
         }

@@ -128,7 +128,7 @@ def test_what_does_not_belong_to_a_robot_is_refused(arm, rng):
     for options, message in [
         ({"arrays": ["positions"]}, "no positions"),
         ({"arrays": ["dofs"]}, "no dofs"),
-        ({"order": "xyzw"}, "order and rotations"),
+        ({"order": "xyzw"}, "order, rotations and heading"),
         ({"out": tumble.MotionState(positions=np.zeros((4, 3), np.float32))}, "no positions"),
     ]:
         with pytest.raises(tumble.InputError, match=message):

@@ -618,9 +618,10 @@ impl ClipTables {
             + size_of_val(&*self.cells)
     }
 
-    /// The same clips without compact forms.
+    /// The same clips without the compact forms of crowds. Motion tables keep their keys, some of which are lines, too.
     pub(crate) fn with_segments(self) -> Self {
-        if self.forms() != ChannelForms::Compact {
+        let is_of_crowd = matches!(self.storage, ClipStorage::Crowd(_));
+        if !is_of_crowd || self.forms() != ChannelForms::Compact {
             return self;
         }
         let mut whole = Self {

@@ -1,4 +1,4 @@
-//! The walk along the frames of a robot's tree. Twin of `shaders/motion/tree.wgsl`.
+//! The walk along the frames of a robot's tree. Twin of `shaders/motion/tree.wgsl` and `shaders/math/rotation_about.wgsl`.
 
 use crate::crowd::states::Joint;
 use crate::math::canonical::canonical;

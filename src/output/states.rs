@@ -53,7 +53,7 @@ impl StateArray {
         }
     }
 
-    /// What a kernel stores of an instance, for so many joints, if the encoding of rotations is `rotations`.
+    /// The numbers that a kernel stores of an instance, for so many joints, if the encoding of rotations is `rotations`.
     pub(crate) fn stored(self, joints: u32, rotations: Encoding) -> StoredArray {
         let encoding = self.encoding(rotations);
         StoredArray {

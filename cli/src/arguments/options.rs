@@ -234,6 +234,7 @@ pub(crate) const OPTIONS: &[OptionRule] = &[
     deciding("joint_order"),
     deciding("siblings"),
     deciding("velocity_at"),
+    deciding("fixed_bodies"),
     deciding("velocities"),
     deciding("limits"),
     deciding("describe"),

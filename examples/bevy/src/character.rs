@@ -21,7 +21,7 @@ pub const JOINTS: MeshVertexAttribute =
 pub const WEIGHTS: MeshVertexAttribute =
     MeshVertexAttribute::new("TumbleWeights", 3_418_700_432, VertexFormat::Float32x4);
 
-/// What a crowd and a renderer need of a character.
+/// A character, for a crowd and a renderer.
 pub struct Character {
     pub library: CrowdLibrary,
     pub mesh: Mesh,

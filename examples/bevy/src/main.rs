@@ -79,7 +79,7 @@ impl Material for Skinned {
     }
 }
 
-/// What the first frame needs.
+/// The things that the first frame needs.
 #[derive(Resource)]
 struct Scene {
     character: Option<Character>,
@@ -153,8 +153,8 @@ fn set_up(
     let (size, distance) = (1.0 / character.height, 1.6);
     let middle = (columns as f32 - 1.0) / 2.0;
     for index in 0..characters {
-        let place = |cell: usize| (cell as f32 - middle) * distance;
-        let (x, z) = (place(index % columns), place(index / columns));
+        let coordinate = |cell: usize| (cell as f32 - middle) * distance;
+        let (x, z) = (coordinate(index % columns), coordinate(index / columns));
         commands.spawn((
             Mesh3d(mesh.clone()),
             MeshMaterial3d(material.clone()),
@@ -162,12 +162,12 @@ fn set_up(
             Transform::from_xyz(x, 0.0, z).with_scale(Vec3::splat(size)),
         ));
     }
-    let far = middle * distance;
+    let extent = middle * distance;
     let camera = commands
         .spawn((
             Camera3d::default(),
-            Transform::from_xyz(far * 0.5, 4.0 + far * 0.25, far * 1.15)
-                .looking_at(Vec3::new(0.0, 0.0, far * 0.4), Vec3::Y),
+            Transform::from_xyz(extent * 0.5, 4.0 + extent * 0.25, extent * 1.15)
+                .looking_at(Vec3::new(0.0, 0.0, extent * 0.4), Vec3::Y),
         ))
         .id();
     if let Some(picture) = scene.picture.take() {

@@ -30,7 +30,7 @@ pub static TORCH: Format = Format {
     ..PICKLES
 };
 
-/// What both formats have.
+/// The parts that both formats have.
 const PICKLES: Format = Format {
     name: "",
     summary: "",

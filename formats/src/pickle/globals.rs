@@ -103,7 +103,7 @@ const KNOWN: &[(&[&str], &str, Global)] = &[
     // Protocols 0 to 2 store empty bytes in this way.
     (BUILTINS, "bytes", Global::ByteArray),
     (BUILTINS, "object", Global::Object),
-    // What a `defaultdict` calls for keys that it does not have.
+    // The function that a `defaultdict` calls for keys that it does not have.
     (BUILTINS, "int", Global::Type("int")),
     (BUILTINS, "long", Global::Type("long")),
     (BUILTINS, "float", Global::Type("float")),

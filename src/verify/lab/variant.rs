@@ -203,7 +203,7 @@ mod tests {
     #[test]
     fn variants_are_all_there_are() {
         let kernels = LabKernel::all();
-        assert_eq!(kernels.len(), 16);
+        assert_eq!(kernels.len(), 18);
         let f16 = kernels
             .iter()
             .find(|one| one.encoding == Encoding::F16)
