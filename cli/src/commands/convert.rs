@@ -183,19 +183,28 @@ impl Arguments {
             let warning = Diagnostic::new(name, Code::NotSymmetric, message);
             words::warn_of(of_clip(warning));
         }
-        let in_place: Vec<usize> = (0..report.alone.len()).collect();
-        if let Some(warning) = lost_partners(name, &report.alone, &in_place) {
+        // Weights of morph targets are no joints.
+        let is_weight = |name: &String| {
+            let scalar = clip.set.scalar_named(name);
+            scalar.is_some_and(|index| clip.scalar(index).kind == ScalarKind::Plain)
+        };
+        let alone: Vec<String> = report
+            .alone
+            .into_iter()
+            .filter(|it| !is_weight(it))
+            .collect();
+        let in_place: Vec<usize> = (0..alone.len()).collect();
+        if let Some(warning) = lost_partners(name, &alone, &in_place) {
             words::warn_of(of_clip(warning));
         }
-        // Weights of morph targets alone are no joints.
         let mut scalars = (0..clip.set.scalar_count()).map(|index| clip.scalar(index).kind);
         if clip.set.track_count() == 0 && scalars.all(|kind| kind == ScalarKind::Plain) {
             return Ok((Cow::Owned(mirrored), None));
         }
         let pairs = words::count(report.pairs.len(), "pair");
-        let alone = match report.alone.len() {
+        let alone = match alone.len() {
             0 => "no joint is".to_owned(),
-            1 => format!("`{}` is", printable(&report.alone[0])),
+            1 => format!("`{}` is", printable(&alone[0])),
             count => format!("{count} joints are"),
         };
         let changed = format!("{pairs} of joints change their sides and {alone} mirrored in place");
@@ -312,7 +321,11 @@ fn note_weights(name: &str, clips: &[&Motion]) {
                 words::count(of_sides.len(), "target"),
                 printable(weights[first])
             );
-            words::warn_of(Diagnostic::new(name, Code::LostPartner, message));
+            let warning = Diagnostic::new(name, Code::LostPartner, message);
+            words::warn_of(match clips.len() {
+                1 => warning,
+                _ => warning.inside(names::clip(clip)),
+            });
         }
     }
 }
