@@ -99,6 +99,8 @@ def motions(rng: np.random.Generator) -> None:
     """4 096 instances of 1 000 clips with 24 joints, as they are asked for in every step of training."""
     clips, joints, pairs = 1000, 24, 4096
     frames = rng.integers(60, 600, clips)
+    # All clips have one skeleton.
+    parents = [None, *rng.integers(0, np.arange(1, joints))]
     made = []
     for count in frames:
         turn = np.cumsum(0.02 * rng.normal(size=(joints, count, 3)), axis=1)
@@ -110,7 +112,7 @@ def motions(rng: np.random.Generator) -> None:
             tumble.Clip(
                 np.arange(count) / 30,
                 keys,
-                parents=[None, *rng.integers(0, np.arange(1, joints))],
+                parents=parents,
                 offsets=0.1 * rng.normal(size=(joints, 3)),
                 translations=[root, *[None] * (joints - 1)],
             )
