@@ -4,7 +4,7 @@
 use std::ffi::{CString, c_char, c_void};
 use std::sync::LazyLock;
 
-use tumble::vulkan::ClipTarget;
+use tumble::vulkan::{ClipTarget, VulkanBuffer};
 use tumble::{Clip, Encoding, EncodingOptions, Error, EulerSequence, MatrixOrder, Request};
 
 use crate::arguments::{Out, SizedStructure, list_mut, needed, option, text, vulkan};
@@ -63,7 +63,7 @@ impl TumbleRequest {
     ///
     /// # Safety
     /// The pointer must be null or point to such a structure, whose pointers are null or as its members say.
-    pub(crate) unsafe fn read<T>(
+    unsafe fn read<T>(
         pointer: *const Self,
         clip: &Clip,
         work: impl FnOnce(Request<'_>) -> Result<T, Failure>,
@@ -238,16 +238,35 @@ pub unsafe extern "C" fn tumble_clip_target_new(
     size: u64,
     target: *mut *mut TumbleClipTarget,
 ) -> TumbleResult {
+    let made = |request: Request<'_>, buffer| {
+        // SAFETY: as the caller promises.
+        let inner = unsafe { request.target(buffer)? };
+        Ok(TumbleClipTarget { inner })
+    };
+    // SAFETY: as the caller promises.
+    unsafe { new_target(clip, request, [buffer, offset, size], target, made) }
+}
+
+/// Gives the handle of what `make` makes of a request for a range of the application's buffer: handle, offset and size.
+///
+/// # Safety
+/// `request` must be as for [`TumbleRequest::read`], and `target` must point to memory for a handle.
+pub(crate) unsafe fn new_target<T: Object>(
+    clip: *const TumbleClip,
+    request: *const TumbleRequest,
+    [buffer, offset, size]: [u64; 3],
+    target: *mut *mut T,
+    make: impl FnOnce(Request<'_>, VulkanBuffer) -> Result<T, Failure>,
+) -> TumbleResult {
     code(|| {
         let out = Out::new(target, "target")?;
         let clip = handle::get(clip)?;
         let buffer = buffer_range(clip.is_on_application_device, buffer, offset, size)?;
         // SAFETY: as the caller promises.
-        let inner = unsafe {
-            TumbleRequest::read(request, &clip.inner, |request| Ok(request.target(buffer)?))?
-        };
+        let made =
+            unsafe { TumbleRequest::read(request, &clip.inner, |request| make(request, buffer))? };
         // SAFETY: as the caller promises.
-        unsafe { out.set(handle::give(TumbleClipTarget { inner })) };
+        unsafe { out.set(handle::give(made)) };
         Ok(())
     })
 }

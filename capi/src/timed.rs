@@ -2,14 +2,14 @@
 
 use std::ffi::c_void;
 
+use tumble::Request;
 use tumble::vulkan::TimedTarget;
 
-use crate::arguments::{Out, list, vulkan};
+use crate::arguments::{list, vulkan};
 use crate::clip::TumbleClip;
 use crate::handle::{self, Object};
-use crate::request::TumbleRequest;
+use crate::request::{TumbleRequest, new_target};
 use crate::result::{TumbleResult, code};
-use crate::vulkan::buffer_range;
 
 /// A timed target: everything that is needed to record samples of a clip at other times in each frame, and the range of
 /// the application's buffer that receives them.
@@ -42,20 +42,13 @@ pub unsafe extern "C" fn tumble_timed_target_new(
     size: u64,
     target: *mut *mut TumbleTimedTarget,
 ) -> TumbleResult {
-    code(|| {
-        let out = Out::new(target, "target")?;
-        let clip = handle::get(clip)?;
-        let buffer = buffer_range(clip.is_on_application_device, buffer, offset, size)?;
+    let made = |request: Request<'_>, buffer| {
         // SAFETY: as the caller promises.
-        let inner = unsafe {
-            TumbleRequest::read(request, &clip.inner, |request| {
-                Ok(request.timed_target(buffer)?)
-            })?
-        };
-        // SAFETY: as the caller promises.
-        unsafe { out.set(handle::give(TumbleTimedTarget { inner })) };
-        Ok(())
-    })
+        let inner = unsafe { request.timed_target(buffer)? };
+        Ok(TumbleTimedTarget { inner })
+    };
+    // SAFETY: as the caller promises.
+    unsafe { new_target(clip, request, [buffer, offset, size], target, made) }
 }
 
 /// Records an evaluation at `times`, which are in seconds, into the application's command buffer `commands`, a

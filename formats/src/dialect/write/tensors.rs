@@ -6,30 +6,20 @@
 
 use std::io::{self, Write};
 
-use tumble::trees::{BodyMotion, BodyOrder};
+use tumble::trees::BodyMotion;
 
-use super::pickles::Pickle;
+use super::pickles::{GMR, Pickle};
 use super::{RobotMotion, WrittenDialect};
 use crate::format::WriteError;
 use crate::npz::write::ArchiveWriter;
-use crate::quaternion::ComponentOrder;
-use crate::robot::VelocityPoint;
 
 pub(super) static PROTOMOTIONS: WrittenDialect = WrittenDialect {
     name: "protomotions",
     summary: "`.motion` of ProtoMotions: joints and bodies, x y z w, velocities of origins; no contacts",
     format: "torch",
-    order: BodyOrder::DepthFirst,
     has_bodies: true,
-    names_joints: false,
-    has_degrees: false,
-    merges_links: false,
-    velocity_at: VelocityPoint::Origin,
-    quaternions: Some(ComponentOrder::Xyzw),
-    assumed_rate: None,
-    has_whole_rate: false,
-    takes_descriptions: false,
     write,
+    ..GMR
 };
 
 /// The folder in the archive.
