@@ -16,7 +16,7 @@ engine=() parts=() files=(--skip validator)
 case ${1:-} in
 wasm32-*)
     # There are no drivers, threads, caught panics or temporary folders. The twins of kernels come with Vulkan.
-    engine=(--no-default-features --features golden)
+    engine=(--no-default-features)
     parts=(--skip threads:: --skip gpu::cache::)
     files+=(--skip beneath:: --skip guarded:: --skip output:: --skip path::tests::files_of_paths
         --skip fixtures --skip gltf:: --skip gltf_bake --skip gltf_gather --skip gltf_new --skip origins

@@ -37,7 +37,7 @@ CARGO_TARGET_DIR=target/without_vulkan cargo run --quiet --manifest-path tests/w
 # The packages to publish can be packed: versions, licences, files. They are not built once more, because a test
 # (tests/tidy.rs) checks that a package has all files that it includes.
 cargo package --quiet --no-verify --allow-dirty --target-dir target/packages \
-    -p tumble -p tumble-exact -p tumble-formats -p tumble-routes -p tumble-cli
+    -p tumble -p tumble-exact -p tumble-formats -p tumble-routes -p tumble-verify -p tumble-cli
 
 # The guide as a book, in which every link leads somewhere.
 ./scripts/book.sh

@@ -24,7 +24,7 @@ module() {
 # (cli/tests/view_live.rs).
 sources() {
     cat npm/Cargo.toml npm/src/*.rs formats/src/motion/{packed,sample,world}.rs \
-        src/verify/golden.txt | sha1sum | cut -d ' ' -f 1
+        verify/src/golden.txt | sha1sum | cut -d ' ' -f 1
 }
 if [ "${1:-}" = --page ]; then
     command -v wasm-opt >/dev/null && command -v zopfli >/dev/null || {

@@ -8,7 +8,7 @@
 #   aarch64   Linux on aarch64, by qemu: recorded hashes, the CPU's tests of the engine and of files
 #   wasm      WebAssembly, by Node: recorded hashes, the CPU's tests, without and with its vectors
 #   windows   Windows on x86-64, by wine: recorded hashes, the CPU's tests, the program's commands
-#   types     macOS and Android: the engine, files and routes type-check
+#   types     macOS and Android: the engine, its proof, files and routes type-check
 #
 # Each step says what it compared, and the script ends at the first that fails.
 set -euo pipefail
@@ -104,9 +104,9 @@ types() {
     local name
     for name in aarch64-apple-darwin aarch64-linux-android; do
         target $name
-        step "$name: the engine, files and routes type-check"
-        cargo check --quiet -p tumble -p tumble-exact -p tumble-formats -p tumble-routes \
-            --no-default-features --features tumble/vulkan --target $name
+        step "$name: the engine, its proof, files and routes type-check"
+        cargo check --quiet -p tumble -p tumble-exact -p tumble-formats -p tumble-routes -p tumble-verify \
+            --no-default-features --features tumble/vulkan,tumble-verify/vulkan --target $name
         echo "they do"
     done
 }

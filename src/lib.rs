@@ -93,6 +93,11 @@ mod fit;
 mod from_keys;
 #[cfg(feature = "vulkan")]
 mod gpu;
+// Measurements within the engine, which need its private parts. They are for the crate `tumble-verify`, which names
+// them for users.
+#[cfg(feature = "lab")]
+#[doc(hidden)]
+pub mod lab;
 mod machine;
 mod math;
 mod memory;
@@ -230,12 +235,6 @@ pub mod vulkan {
     //! application's device do not exist.
 
     pub use crate::device::VulkanDevice;
-    #[cfg(feature = "prove")]
-    pub use crate::gpu::engine::figures::EngineChoices;
-    #[cfg(feature = "prove")]
-    pub use crate::gpu::physical::details::{
-        DeviceDetails, FloatControlsReport, Limits, MemoryHeap, MemoryType, QueueFamily,
-    };
     pub use crate::machine::error::VulkanError;
     pub use crate::machine::options::Timings;
     pub use crate::machine::reports::{

@@ -1,4 +1,4 @@
-//! The golden hashes (`tumble::verify::golden`) on the CPU at every vector width and on every Vulkan
+//! The golden hashes (`tumble_verify::golden`) on the CPU at every vector width and on every Vulkan
 //! device, however its kernels read.
 //!
 //! `UPDATE_GOLDEN=1 cargo test golden` records them anew, `UPDATE_GOLDEN=new` only those of cases that
@@ -9,8 +9,8 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use crate::support::{round_robin, vulkan_engines};
-use tumble::verify::golden::Golden;
 use tumble::{Device, Engine, EngineOptions, VectorWidth};
+use tumble_verify::golden::Golden;
 
 /// The CPU at every vector width.
 fn every_width() -> Vec<Engine> {
@@ -34,7 +34,7 @@ fn record(golden: &Golden, update: &str) {
         let hash = known.map_or_else(evaluate, str::to_owned);
         writeln!(table, "{hash} {name}").expect("memory takes everything");
     }
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/verify/golden.txt");
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("verify/src/golden.txt");
     std::fs::write(path, table).unwrap();
     println!("recorded; what is compared is what was compiled: run the test again");
 }
@@ -48,7 +48,7 @@ fn results_have_the_recorded_hashes() {
     assert_eq!(
         Golden::recorded_count(),
         golden.case_count(),
-        "src/verify/golden.txt has other cases"
+        "verify/src/golden.txt has other cases"
     );
     let mut wrong = Vec::new();
     let (widths, vulkan) = (every_width(), vulkan_engines(|_| {}));

@@ -13,6 +13,7 @@ use std::path::Path;
 /// shorter.
 const KNOWN: &[(&str, &str)] = &[
     ("src", ""),
+    ("verify/src", ""),
     ("formats/src", ""),
     ("cli/src", ""),
     ("python/src", ""),

@@ -9,7 +9,7 @@ mod representations;
 mod stream;
 
 use std::sync::Arc;
-#[cfg(feature = "prove")]
+#[cfg(feature = "lab")]
 use std::time::Duration;
 
 use crate::checks::check_encoding;
@@ -21,9 +21,9 @@ use crate::engine::groups::GroupedSet;
 use crate::error::Error;
 use crate::evaluate;
 use crate::evaluate::uploaded::Uploaded;
-#[cfg(feature = "prove")]
+#[cfg(feature = "lab")]
 use crate::gpu::engine::figures::EngineChoices;
-#[cfg(feature = "prove")]
+#[cfg(feature = "lab")]
 use crate::gpu::physical::details::DeviceDetails;
 use crate::machine::Machine;
 use crate::machine::options::{EngineOptions, Timings};
@@ -131,14 +131,14 @@ impl Engine {
     }
 
     /// All details that Vulkan reports of the device; `None` on the CPU.
-    #[cfg(feature = "prove")]
+    #[cfg(feature = "lab")]
     #[must_use]
     pub fn device_details(&self) -> Option<DeviceDetails> {
         Some(self.opened()?.engine().device.physical.details())
     }
 
     /// The engine's choices for its device; `None` on the CPU.
-    #[cfg(feature = "prove")]
+    #[cfg(feature = "lab")]
     #[must_use]
     pub fn choices(&self) -> Option<EngineChoices> {
         Some(self.opened()?.engine().choices())
@@ -158,7 +158,7 @@ impl Engine {
     ///
     /// # Errors
     /// When the device fails.
-    #[cfg(feature = "prove")]
+    #[cfg(feature = "lab")]
     pub fn compile_kernels(
         &self,
         each: &mut dyn FnMut(&'static str, Duration) -> bool,
@@ -186,7 +186,7 @@ impl Engine {
     ///
     /// # Errors
     /// When the device fails.
-    #[cfg(feature = "prove")]
+    #[cfg(feature = "lab")]
     pub fn check_kernels_while(
         &self,
         each: &mut dyn FnMut(KernelCheck) -> bool,

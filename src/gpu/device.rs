@@ -229,7 +229,7 @@ impl LogicalDevice {
     }
 
     /// Whether results are copied on another queue than the kernels'.
-    #[cfg(feature = "prove")]
+    #[cfg(feature = "lab")]
     pub(crate) fn has_copy_queue(&self) -> bool {
         self.copy_queue.is_some()
     }

@@ -41,23 +41,18 @@ impl Instance {
     /// [`VulkanError::NoLoader`] without a loader, [`VulkanError::NoDevice`] without a driver; else the
     /// call that failed.
     pub(crate) fn new(validation: bool) -> Result<Arc<Self>, VulkanError> {
-        Self::of_version(validation, vk::API_VERSION_1_3)
-    }
-
-    /// As `new`, for an application that requests this version of Vulkan.
-    pub(crate) fn of_version(validation: bool, api_version: u32) -> Result<Arc<Self>, VulkanError> {
         // The Vulkan loader returns these errors if it finds no driver.
         let is_absence = |error: &VulkanError| {
             matches!(error, VulkanError::Call { result, .. }
                 if *result == vk::Result::ERROR_INCOMPATIBLE_DRIVER)
         };
-        Self::create(validation, api_version).map_err(|error| match is_absence(&error) {
+        Self::create(validation).map_err(|error| match is_absence(&error) {
             true => VulkanError::NoDevice,
             false => error,
         })
     }
 
-    fn create(validation: bool, api_version: u32) -> Result<Arc<Self>, VulkanError> {
+    fn create(validation: bool) -> Result<Arc<Self>, VulkanError> {
         if USED_BY
             .get()
             .is_some_and(|&process| process != std::process::id())
@@ -104,7 +99,7 @@ impl Instance {
         let application = vk::ApplicationInfo::default()
             .application_name(c"tumble")
             .engine_name(c"tumble")
-            .api_version(api_version);
+            .api_version(vk::API_VERSION_1_3);
         let messages: Box<Mutex<Vec<String>>> = Box::default();
         let mut messenger_info = vk::DebugUtilsMessengerCreateInfoEXT::default()
             .message_severity(
@@ -173,14 +168,8 @@ impl Instance {
         })
     }
 
-    /// The loaded functions.
-    #[cfg(feature = "prove")]
-    pub(crate) fn entry(&self) -> &ash::Entry {
-        &self._entry
-    }
-
     /// The loader's version.
-    #[cfg(feature = "prove")]
+    #[cfg(feature = "lab")]
     pub(crate) fn loader_version(&self) -> u32 {
         // SAFETY: no requirements beyond a loaded entry.
         let version = unsafe { self._entry.try_enumerate_instance_version() };
@@ -223,7 +212,7 @@ const HOMEBREW: [&str; 4] = [
 ];
 
 /// The loader's library.
-fn loader() -> Result<ash::Entry, VulkanError> {
+pub(crate) fn loader() -> Result<ash::Entry, VulkanError> {
     // SAFETY: loading a library runs its initialisers, which is intended.
     let default = unsafe { ash::Entry::load() };
     default.or_else(|error| {

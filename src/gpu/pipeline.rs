@@ -82,7 +82,7 @@ impl Pipeline {
     }
 
     /// The pipeline of a kernel's code, which differs from the engine's in ways that no bit depends on.
-    #[cfg(feature = "prove")]
+    #[cfg(feature = "lab")]
     pub(crate) fn of_code(
         device: &Arc<LogicalDevice>,
         kernel: Kernel,

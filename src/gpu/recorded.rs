@@ -312,7 +312,7 @@ impl<'a> Commands<'a> {
     }
 
     /// Records that the first bytes of a buffer, a multiple of 4, are filled with a word.
-    #[cfg(feature = "prove")]
+    #[cfg(feature = "lab")]
     pub(crate) fn fill(self, to: &Buffer, bytes: u64, word: u32) {
         let (raw, bytes) = (&self.device.raw, bytes.min(to.size));
         // SAFETY: as in `copy`; the range lies within the buffer.

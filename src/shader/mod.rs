@@ -1,7 +1,7 @@
 //! Constants, buffer structs and kernels (as SPIR-V, by name) that the shaders share with Rust, as the shader
 //! compiler wrote them into `shaders/compiled`.
 
-#[cfg(feature = "prove")]
+#[cfg(feature = "lab")]
 pub(crate) mod spirv;
 
 mod generated {

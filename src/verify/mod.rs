@@ -2,25 +2,9 @@
 //!
 //! Verification does not rely on the engine's reports about itself. The reference shares no code with the kernels.
 
-#[cfg(feature = "prove")]
-mod application;
 mod buffers;
 mod comparison;
-#[cfg(feature = "prove")]
-pub mod figures;
-#[cfg(feature = "golden")]
-pub mod golden;
-#[cfg(feature = "prove")]
-pub mod lab;
 pub(crate) mod outputs;
-#[cfg(feature = "prove")]
-pub mod random;
-#[cfg(feature = "prove")]
-pub mod renderer;
-#[cfg(feature = "prove")]
-pub mod resident;
-#[cfg(feature = "golden")]
-pub(crate) mod sets;
 
 pub use crate::verify::buffers::{
     BufferComparison, BufferLengthError, DifferenceKind, UNWRITTEN, WordBound, WordDifference,

@@ -272,7 +272,7 @@ impl Recording {
     }
 
     /// A barrier that no step needs, as measurements record it.
-    #[cfg(feature = "prove")]
+    #[cfg(feature = "lab")]
     pub(crate) fn barrier(&mut self, from: Users, to: Users) {
         self.steps.push(Step::Barrier { from, to });
     }

@@ -1,7 +1,7 @@
 //! Evaluation on a Vulkan device.
 
 mod arcs;
-#[cfg(feature = "prove")]
+#[cfg(feature = "lab")]
 pub(crate) mod figures;
 pub(crate) mod from_keys;
 pub(crate) mod run;

@@ -103,7 +103,7 @@ fn of_form<S: Segment>(list: List, store: Store, random: &mut Random) -> Vec<Tri
 
 /// A trial of the kernel over spread runs of frames in an encoding: the same samples for any lanes and workgroups, so
 /// often repeated.
-#[cfg(feature = "prove")]
+#[cfg(feature = "lab")]
 pub(crate) fn spread_trial(
     (form, encoding): (Form, Encoding),
     lanes: SpreadLanes,
@@ -127,7 +127,7 @@ pub(crate) fn spread_trial(
 }
 
 /// The bytes of segments between rotations.
-#[cfg(feature = "prove")]
+#[cfg(feature = "lab")]
 pub(crate) fn rotations(form: Form, count: usize) -> Vec<u8> {
     let random = &mut Random::canonical();
     match form {

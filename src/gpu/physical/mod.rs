@@ -2,7 +2,7 @@
 
 #[cfg(test)]
 pub(crate) mod cards;
-#[cfg(feature = "prove")]
+#[cfg(feature = "lab")]
 pub(crate) mod details;
 pub(crate) mod external;
 pub(crate) mod queues;

@@ -129,7 +129,7 @@ impl SpreadLanes {
     }
 
     /// Lanes with neighbouring tracks, whose samples are so far from each other.
-    #[cfg(feature = "prove")]
+    #[cfg(feature = "lab")]
     pub(crate) fn with_tracks(log2: u32, stride: u32) -> Self {
         Self {
             axis: LaneAxis::Tracks { stride },
@@ -138,7 +138,7 @@ impl SpreadLanes {
     }
 
     /// The same for a kernel whose workgroups have another number of invocations.
-    #[cfg(feature = "prove")]
+    #[cfg(feature = "lab")]
     pub(crate) fn with_workgroup(self, workgroup: u32) -> Self {
         Self { workgroup, ..self }
     }
@@ -297,7 +297,7 @@ impl SpreadLanes {
 
     /// The push constants of a dispatch, whose values are stored from an index on.
     // Lists without repetitions are used only by the lab and by tests.
-    #[cfg_attr(not(feature = "prove"), allow(dead_code))]
+    #[cfg_attr(not(feature = "lab"), allow(dead_code))]
     pub(crate) fn dispatch(self, entries: [u32; 2], detail: u32, output: u32) -> Spread {
         self.dispatch_repeated(entries, RunRepetitions::ONE, detail, output)
     }

@@ -8,8 +8,8 @@ use std::error::Error;
 use std::f32::consts::FRAC_PI_2;
 
 use tumble::glam::Quat;
-use tumble::verify::golden::Golden;
 use tumble::{Device, Engine, EngineOptions, SampleTimes, TrackSet, VectorWidth, method};
+use tumble_verify::golden::Golden;
 
 fn main() -> Result<(), Box<dyn Error>> {
     match env::args().nth(1).as_deref() {

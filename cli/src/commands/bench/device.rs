@@ -4,9 +4,9 @@
 use std::fmt::Write;
 
 use serde::Serialize;
-use tumble::verify::resident::WriteRates;
-use tumble::vulkan::{DeviceKind, EngineChoices};
+use tumble::vulkan::DeviceKind;
 use tumble::{Device, Engine};
+use tumble_verify::lab::{EngineChoices, WriteRates};
 
 /// An open device.
 pub(crate) struct BenchDevice {

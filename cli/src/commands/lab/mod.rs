@@ -6,9 +6,9 @@ use std::time::{Duration, Instant};
 
 use clap::Args;
 use serde::Serialize;
-use tumble::verify::lab::{LabOptions, LabReport, lab};
 use tumble::vulkan::DeviceInfo;
 use tumble::{Engine, EngineOptions};
+use tumble_verify::lab::{LabOptions, LabReport, lab};
 
 use crate::arguments::device::{refused, vulkan_device};
 use crate::commands::prove::ReportOutput;

@@ -1,6 +1,6 @@
 //! The page of a lab, for people: at most [`MAX_LINES`] lines. The JSON has everything.
 
-use tumble::verify::lab::{
+use tumble_verify::lab::{
     HalfConversion, KernelVariant, LabReport, LabRow, RunList, StoreCaching, Timed,
 };
 
@@ -132,7 +132,7 @@ fn described(variant: KernelVariant) -> String {
 
 #[cfg(test)]
 mod tests {
-    use tumble::verify::lab::{Ceiling, RejectedVariant, VariantTime};
+    use tumble_verify::lab::{Ceiling, RejectedVariant, VariantTime};
 
     use super::*;
 

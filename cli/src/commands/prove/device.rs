@@ -6,7 +6,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use sha2::{Digest as _, Sha256};
 use tumble::VectorWidth;
-use tumble::verify::golden::Golden;
+use tumble_verify::golden::Golden;
 
 use crate::commands::prove::report::{Bus, Host, Program, hexadecimal};
 

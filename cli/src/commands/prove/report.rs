@@ -6,11 +6,12 @@ use std::path::Path;
 use serde::Serialize;
 use serde_json::Value;
 use sha2::{Digest as _, Sha256};
-use tumble::verify::figures::Figures;
-use tumble::verify::random::RandomRound;
-use tumble::verify::renderer::{RendererCheck, RendererReport};
 use tumble::vulkan::tuning::RunLanes;
-use tumble::vulkan::{DeviceDetails, DeviceInfo, EngineChoices, SelfTestReport};
+use tumble::vulkan::{DeviceInfo, SelfTestReport};
+use tumble_verify::figures::Figures;
+use tumble_verify::lab::{DeviceDetails, EngineChoices};
+use tumble_verify::random::RandomRound;
+use tumble_verify::renderer::{RendererCheck, RendererReport};
 
 use crate::messages::exit::{ALL_INPUTS, Failure};
 

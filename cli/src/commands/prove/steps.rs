@@ -4,13 +4,13 @@
 use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
 
-use tumble::verify::figures::figures_with;
-use tumble::verify::golden::Golden;
-use tumble::verify::random::{round, scalars_round};
-use tumble::verify::renderer::renderer;
 use tumble::vulkan::VulkanDevice;
 use tumble::vulkan::tuning::{Mapping, PrepareArcs, ReadBack, Reads, RunLanes, Transfer, Uploads};
 use tumble::{Device, Engine, EngineOptions};
+use tumble_verify::figures::figures_with;
+use tumble_verify::golden::Golden;
+use tumble_verify::random::{round, scalars_round};
+use tumble_verify::renderer::renderer;
 
 use crate::commands::prove::report::{
     CompileTimes, DeviceSection, DifferingValues, FORMAT, FORMAT_VERSION, GoldenSection,

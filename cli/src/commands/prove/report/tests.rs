@@ -1,8 +1,8 @@
 //! A proof that cannot fail proves nothing: each thing that it must have is taken away, and it is no proof.
 
 use tumble::Device;
-use tumble::verify::renderer::{RendererCheck, RendererReport};
 use tumble::vulkan::SelfTestReport;
+use tumble_verify::renderer::{RendererCheck, RendererReport};
 
 use super::*;
 use crate::commands::prove::text;

@@ -1,18 +1,16 @@
-//! A device as an application makes it: an instance of Vulkan 1.1, a queue that computes, a queue that only copies
-//! (if the device has one), and the application's buffers and commands. The proof of a device
-//! ([`renderer`](crate::verify::renderer)) runs the engine on it, and measures with its time stamps.
+//! A device as an application makes it, with nothing of the engine but its public interface: an instance of Vulkan 1.1, a
+//! queue that computes, a queue that only copies (if the device has one), and the application's buffers and commands. The
+//! proof of a device ([`renderer`](crate::renderer)) runs the engine on it, and measures with its time stamps.
 #![allow(unsafe_code)]
 
-use std::sync::Arc;
+use std::mem::ManuallyDrop;
 use std::time::{Duration, Instant};
 
 use ash::{khr, vk};
+use tumble::lab::load_vulkan;
+use tumble::vulkan::{VulkanBuffer, VulkanError, VulkanHandles, VulkanQueue};
 
-use crate::gpu::handles::{VulkanBuffer, VulkanHandles, VulkanQueue};
-use crate::gpu::instance::Instance;
-use crate::gpu::physical::PhysicalDevice;
-use crate::machine::error::VulkanError;
-use crate::machine::error::calls::Named;
+use crate::instance::{Instance, Named};
 
 /// The Vulkan version that the application requests.
 const VERSION: u32 = vk::API_VERSION_1_1;
@@ -22,9 +20,13 @@ const TIMEOUT_SECONDS: u64 = 60;
 
 /// An application's device, which is destroyed together with this.
 pub(crate) struct Application {
-    pub(crate) physical: PhysicalDevice,
+    memory: vk::PhysicalDeviceMemoryProperties,
+    clock: Clock,
+    physical_device: vk::PhysicalDevice,
+    has_int64: bool,
     device: ash::Device,
     queue: vk::Queue,
+    queue_family: u32,
     pub(crate) copy_queue: Option<VulkanQueue>,
     pool: vk::CommandPool,
     /// Two time stamps; null if the queue has none.
@@ -32,7 +34,24 @@ pub(crate) struct Application {
     /// Whether a wait timed out; then nothing may be destroyed.
     has_hung: bool,
     // The last field, so that it is destroyed last.
-    instance: Arc<Instance>,
+    instance: ManuallyDrop<Instance>,
+}
+
+/// The clock of a queue's time stamps.
+#[derive(Debug, Clone, Copy)]
+struct Clock {
+    /// The number of valid bits of a stamp; 0 if there are no stamps.
+    bits: u32,
+    /// The unit of stamps in nanoseconds.
+    period: f64,
+}
+
+impl Clock {
+    /// The time between two stamps.
+    fn between(self, start: u64, end: u64) -> Duration {
+        let ticks = end.wrapping_sub(start) & (u64::MAX >> (64 - self.bits.clamp(1, 64)));
+        Duration::from_nanos((ticks as f64 * self.period) as u64)
+    }
 }
 
 /// The memory of an application's buffer.
@@ -63,6 +82,20 @@ pub(crate) struct Elapsed {
     pub(crate) on_host: Duration,
 }
 
+/// The family that computes: the first that does not draw, which a desktop keeps busy; otherwise the first.
+fn compute_family(families: &[vk::QueueFamilyProperties]) -> Option<u32> {
+    let computes = |family: &vk::QueueFamilyProperties| {
+        family.queue_count > 0 && family.queue_flags.contains(vk::QueueFlags::COMPUTE)
+    };
+    let draws =
+        |family: &vk::QueueFamilyProperties| family.queue_flags.contains(vk::QueueFlags::GRAPHICS);
+    let alone = families
+        .iter()
+        .position(|family| computes(family) && !draws(family));
+    let found = alone.or_else(|| families.iter().position(computes));
+    found.map(|index| index as u32)
+}
+
 /// The family that only copies: it has no graphics and no compute.
 fn copy_family(families: &[vk::QueueFamilyProperties], compute: u32) -> Option<u32> {
     let only_copies = |family: &vk::QueueFamilyProperties| {
@@ -83,19 +116,25 @@ fn copy_family(families: &[vk::QueueFamilyProperties], compute: u32) -> Option<u
 impl Application {
     /// Opens the physical device with this UUID.
     pub(crate) fn new(uuid: &str, validation: bool) -> Result<Self, VulkanError> {
-        let instance = Instance::of_version(validation, VERSION)?;
-        // SAFETY: the instance is alive, here and below.
-        let all = unsafe { instance.raw.enumerate_physical_devices() };
-        let all = all.named("vkEnumeratePhysicalDevices")?.into_iter();
-        let mut found = all.filter_map(|raw| PhysicalDevice::new(&instance, raw).ok().flatten());
-        let physical = found
-            .find(|physical| physical.info.uuid == uuid)
-            .ok_or(VulkanError::NoDevice)?;
-        // SAFETY: as above.
+        let instance = Instance::new(load_vulkan()?, VERSION, validation)?;
+        let physical_device = instance.physical_device(uuid)?;
+        // SAFETY: the instance is alive, and the physical device is one of it, here and below.
         let families =
-            unsafe { (instance.raw).get_physical_device_queue_family_properties(physical.raw) };
-        let family = physical.queue_family;
-        let copy_family = copy_family(&families, family).filter(|_| physical.has_timelines);
+            unsafe { (instance.raw).get_physical_device_queue_family_properties(physical_device) };
+        // SAFETY: as above.
+        let properties = unsafe { (instance.raw).get_physical_device_properties(physical_device) };
+        // SAFETY: as above.
+        let memory =
+            unsafe { (instance.raw).get_physical_device_memory_properties(physical_device) };
+        // SAFETY: as above.
+        let has = unsafe { (instance.raw).get_physical_device_features(physical_device) };
+        let has_int64 = has.shader_int64 == vk::TRUE;
+        let [timelines, portability] = instance.extensions(
+            physical_device,
+            [khr::timeline_semaphore::NAME, khr::portability_subset::NAME],
+        )?;
+        let family = compute_family(&families).ok_or(VulkanError::NoDevice)?;
+        let copy_family = copy_family(&families, family).filter(|_| timelines);
         let of_family = |family| {
             vk::DeviceQueueCreateInfo::default()
                 .queue_family_index(family)
@@ -103,11 +142,11 @@ impl Application {
         };
         let mut queues = vec![of_family(family)];
         queues.extend(copy_family.map(of_family));
-        let features = vk::PhysicalDeviceFeatures::default().shader_int64(physical.has_int64);
+        let features = vk::PhysicalDeviceFeatures::default().shader_int64(has_int64);
         let extensions = [
             // An instance of Vulkan 1.1 has timelines by their extension.
             (copy_family.is_some(), khr::timeline_semaphore::NAME),
-            (physical.portability_subset, khr::portability_subset::NAME),
+            (portability, khr::portability_subset::NAME),
         ];
         let extensions: Vec<_> = (extensions.iter())
             .filter(|(there, _)| *there)
@@ -123,21 +162,25 @@ impl Application {
             info = info.push_next(&mut timelines);
         }
         // SAFETY: the physical device belongs to the instance and has these families.
-        let device = unsafe { instance.raw.create_device(physical.raw, &info, None) }
+        let device = unsafe { (instance.raw).create_device(physical_device, &info, None) }
             .named("vkCreateDevice")?;
         // SAFETY: these queues were just created.
         let queue = |family| unsafe { device.get_device_queue(family, 0) };
         let mut application = Self {
+            memory,
+            clock: Clock {
+                bits: families[family as usize].timestamp_valid_bits,
+                period: f64::from(properties.limits.timestamp_period),
+            },
+            physical_device,
+            has_int64,
             queue: queue(family),
-            copy_queue: copy_family.map(|family| VulkanQueue {
-                queue: queue(family),
-                family,
-            }),
-            physical,
+            queue_family: family,
+            copy_queue: copy_family.map(|family| VulkanQueue::new(queue(family), family)),
             pool: vk::CommandPool::null(),
             stamps: vk::QueryPool::null(),
             has_hung: false,
-            instance,
+            instance: ManuallyDrop::new(instance),
             device,
         };
         let device = &application.device;
@@ -145,7 +188,7 @@ impl Application {
         // SAFETY: the device is alive; destroyed in `drop`, here and below.
         application.pool =
             unsafe { device.create_command_pool(&info, None) }.named("vkCreateCommandPool")?;
-        if application.physical.timestamp_bits() > 0 {
+        if application.clock.bits > 0 {
             let info = vk::QueryPoolCreateInfo::default()
                 .query_type(vk::QueryType::TIMESTAMP)
                 .query_count(2);
@@ -158,20 +201,16 @@ impl Application {
 
     /// The handles for the engine.
     pub(crate) fn handles(&self) -> VulkanHandles {
-        VulkanHandles {
-            entry: self.instance.entry().clone(),
-            instance: self.instance.raw.clone(),
-            api_version: VERSION,
-            physical_device: self.physical.raw,
-            device: self.device.clone(),
-            shader_float_controls: false,
-            shader_int64: self.physical.has_int64,
-            queue: self.queue,
-            queue_family: self.physical.queue_family,
-            copy_queue: self.copy_queue,
-            queue_lock: None,
-            pipeline_cache: None,
-        }
+        let mut handles = VulkanHandles::new(
+            self.instance.entry.clone(),
+            self.instance.raw.clone(),
+            VERSION,
+            self.physical_device,
+            self.device.clone(),
+            VulkanQueue::new(self.queue, self.queue_family),
+        );
+        handles.shader_int64 = self.has_int64;
+        handles.with_copy_queue(self.copy_queue)
     }
 
     /// The messages of the validation layer so far.
@@ -203,7 +242,7 @@ impl Application {
         };
         // SAFETY: as above.
         let needs = unsafe { self.device.get_buffer_memory_requirements(raw) };
-        let types = self.physical.memory.memory_types_as_slice();
+        let types = self.memory.memory_types_as_slice();
         let find = |with: Flags, without: Flags| {
             (0..types.len() as u32).find(|&index| {
                 let flags = types[index as usize].property_flags;
@@ -380,7 +419,7 @@ impl Application {
             let read =
                 unsafe { (self.device).get_query_pool_results(self.stamps, 0, &mut stamps, flags) };
             elapsed.on_device = (read.is_ok())
-                .then(|| self.physical.between(stamps[0], stamps[1]))
+                .then(|| self.clock.between(stamps[0], stamps[1]))
                 .filter(|time| !time.is_zero());
         }
         Ok(elapsed)
@@ -397,11 +436,7 @@ impl Application {
 impl ApplicationBuffer {
     /// A range of the buffer, for the engine.
     pub(crate) fn range(&self, offset: u64, size: u64) -> VulkanBuffer {
-        VulkanBuffer {
-            buffer: self.raw,
-            offset,
-            size,
-        }
+        VulkanBuffer::new(self.raw, size).at(offset)
     }
 
     /// The first bytes of a buffer in host memory, which nothing may write at this time.
@@ -434,15 +469,16 @@ impl Drop for ApplicationBuffer {
 impl Drop for Application {
     fn drop(&mut self) {
         if self.has_hung {
-            std::mem::forget(Arc::clone(&self.instance));
             return;
         }
-        // SAFETY: engines, clips and buffers of it are gone; null is allowed.
+        // SAFETY: engines, clips and buffers of it are gone; null is allowed. The instance is dropped once, after its
+        // device.
         unsafe {
             let _ = self.device.device_wait_idle();
             self.device.destroy_query_pool(self.stamps, None);
             self.device.destroy_command_pool(self.pool, None);
             self.device.destroy_device(None);
+            ManuallyDrop::drop(&mut self.instance);
         }
     }
 }
@@ -450,14 +486,42 @@ impl Drop for Application {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gpu::physical::cards::card;
 
     /// NVIDIA's copy engines are also for sparse memory; the family for video copies too, and is left alone.
     #[test]
     fn the_copy_queue_is_one_that_neither_draws_nor_computes() {
-        let of = |name| copy_family(&card(name).families, 0);
-        assert_eq!(of("H200"), Some(1));
-        assert_eq!(of("RTX 4060"), Some(1));
-        assert_eq!(of("lavapipe"), None);
+        use vk::QueueFlags as Flags;
+        let all = Flags::GRAPHICS | Flags::COMPUTE | Flags::TRANSFER;
+        let copies = Flags::TRANSFER | Flags::SPARSE_BINDING;
+        let families = |flags: &[Flags]| -> Vec<vk::QueueFamilyProperties> {
+            let of = |&flags| {
+                vk::QueueFamilyProperties::default()
+                    .queue_count(1)
+                    .queue_flags(flags)
+            };
+            flags.iter().map(of).collect()
+        };
+        let card = families(&[
+            all,
+            Flags::TRANSFER | Flags::VIDEO_DECODE_KHR,
+            copies,
+            Flags::COMPUTE | copies,
+        ]);
+        assert_eq!(compute_family(&card), Some(3));
+        assert_eq!(copy_family(&card, 3), Some(2));
+        let software = families(&[all]);
+        assert_eq!(compute_family(&software), Some(0));
+        assert_eq!(copy_family(&software, 0), None);
+    }
+
+    /// Stamps of few bits begin again at 0.
+    #[test]
+    fn a_clock_that_overflows_gives_the_time_between() {
+        let clock = Clock {
+            bits: 36,
+            period: 2.0,
+        };
+        let found = clock.between((1 << 36) - 5, 10);
+        assert_eq!(found, Duration::from_nanos(30));
     }
 }

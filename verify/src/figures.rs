@@ -1,24 +1,17 @@
-//! Speed of a device by its time stamps, on a renderer's device ([`mod@crate::verify::renderer`]): memory, the bus, a
+//! Speed of a device by its time stamps, on a renderer's device ([`mod@crate::renderer`]): memory, the bus, a
 //! submission, and the engine's cases relative to these.
 
 use std::time::{Duration, Instant};
 
-use crate::crowd::layer::CrowdLayer;
-use crate::crowd::library::CrowdLibrary;
-use crate::device::VulkanDevice;
-use crate::engine::Engine;
-use crate::error::Error;
-use crate::gpu::physical::DeviceKind;
-use crate::machine::options::EngineOptions;
-use crate::method::{self, Method};
-use crate::output::crowd::{CrowdOutput, CrowdValues};
-use crate::output::encoding::Encoding;
-use crate::output::rotations::Layout;
-use crate::time::frames::SampleTimes;
-use crate::verify::application::{ApplicationBuffer, ApplicationMemory, Elapsed};
-use crate::verify::golden::GoldenError;
-use crate::verify::renderer::{Renderer, record, record_clip, record_clip_in_row, record_in_row};
-use crate::verify::sets::{
+use ash::vk;
+use tumble::crowd::{CrowdLayer, CrowdLibrary, CrowdOutput, CrowdValues};
+use tumble::vulkan::{DeviceKind, VulkanDevice};
+use tumble::{Encoding, Engine, EngineOptions, Error, Layout, Method, SampleTimes, method};
+
+use crate::application::{Application, ApplicationBuffer, ApplicationMemory, Elapsed};
+use crate::golden::GoldenError;
+use crate::renderer::{Renderer, record, record_clip, record_clip_in_row, record_in_row};
+use crate::sets::{
     SeededRandom, crowd_layer, crowd_library, shared_set, typical_layer, typical_library,
 };
 
@@ -183,7 +176,7 @@ impl Bench {
     fn rate(
         &mut self,
         bytes: u64,
-        commands: impl Fn(&crate::verify::application::Application, ash::vk::CommandBuffer),
+        commands: impl Fn(&Application, vk::CommandBuffer),
     ) -> Result<f64, Error> {
         let application = &mut self.renderer.application;
         let (_, runs) = measured(|| {
@@ -351,7 +344,7 @@ impl Bench {
 
     fn encoded(&mut self) -> Result<(), Error> {
         for encoding in Encoding::ALL {
-            if encoding.row().error_bound.is_some() {
+            if encoding.stores_rotations() {
                 self.kept("encoded", method::SLERP, encoding, Layout::TrackMajor)?;
             }
         }

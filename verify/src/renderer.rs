@@ -3,30 +3,22 @@
 //! copied on a separate queue. Every bit is compared with the CPU's.
 #![allow(unsafe_code)] // the device, the buffers and the commands are the application's
 
+use ash::vk;
 use glam::{Quat, Vec3};
+use tumble::crowd::{Crowd, CrowdError, CrowdOutput, CrowdValues};
+use tumble::vulkan::tuning::{ReadBack, Transfer};
+use tumble::vulkan::{
+    ClipTarget, CommandScopes, CommandUsers, CrowdTarget, PassTarget, PosePass, VulkanDevice,
+};
+use tumble::{
+    Clip, Device, Encoding, Engine, EngineOptions, Error, Layout, Method, SampleTimes, Skeleton,
+    method,
+};
 
-use crate::crowd::player::Crowd;
-use crate::crowd_error::CrowdError;
-use crate::device::{Device, VulkanDevice};
-use crate::engine::Engine;
-use crate::engine::clip::Clip;
-use crate::error::Error;
-use crate::gpu::clip::ClipTarget;
-use crate::gpu::crowd::CrowdTarget;
-use crate::gpu::passes::PassTarget;
-use crate::gpu::recorded::{CommandScopes, CommandUsers};
-use crate::machine::options::{EngineOptions, ReadBack, Transfer};
-use crate::method::{self, Method};
-use crate::output::crowd::{CrowdOutput, CrowdValues};
-use crate::output::encoding::Encoding;
-use crate::output::rotations::Layout;
-use crate::pose::pass::PosePass;
-use crate::pose::skeleton::Skeleton;
-use crate::time::frames::SampleTimes;
-use crate::verify::application::{Application, ApplicationBuffer, ApplicationMemory, Elapsed};
-use crate::verify::differences;
-use crate::verify::golden::GoldenError;
-use crate::verify::sets::{SeededRandom, crowd_layer, crowd_library, random_set, shared_set};
+use crate::application::{Application, ApplicationBuffer, ApplicationMemory, Elapsed};
+use crate::differences::Differences;
+use crate::golden::GoldenError;
+use crate::sets::{SeededRandom, crowd_layer, crowd_library, random_set, shared_set};
 
 /// The number of frames in flight.
 const FRAMES: usize = 3;
@@ -153,7 +145,7 @@ impl Renderer {
 /// Records a clip's samples, `offset` bytes after the start of the target's range.
 pub(crate) fn record_clip(
     target: &ClipTarget,
-    commands: ash::vk::CommandBuffer,
+    commands: vk::CommandBuffer,
     offset: u64,
 ) -> Result<(), Error> {
     // SAFETY: the commands are in recording and of the same device; callers here wait for them before the
@@ -165,7 +157,7 @@ pub(crate) fn record_clip(
 pub(crate) fn record(
     crowd: &mut Crowd,
     target: &CrowdTarget,
-    commands: ash::vk::CommandBuffer,
+    commands: vk::CommandBuffer,
 ) -> Result<(), CrowdError> {
     // SAFETY: the commands are in recording and of the same device; callers here submit them once, in the
     // order of the calls, to the engine's queue, and wait for them before the target goes.
@@ -173,37 +165,35 @@ pub(crate) fn record(
 }
 
 /// The scopes of a recording between others of the same target.
-const IN_ROW: CommandScopes = CommandScopes {
-    before: CommandUsers::KernelsAndCopies,
-    after: CommandUsers::KernelsAndCopies,
-};
+fn in_row() -> CommandScopes {
+    CommandScopes::default()
+        .with_before(CommandUsers::KernelsAndCopies)
+        .with_after(CommandUsers::KernelsAndCopies)
+}
 
 /// As [`record_clip`], between recordings of the same target.
 pub(crate) fn record_clip_in_row(
     target: &ClipTarget,
-    commands: ash::vk::CommandBuffer,
+    commands: vk::CommandBuffer,
 ) -> Result<(), Error> {
     // SAFETY: as in `record_clip`; nothing else uses the result's memory.
-    Ok(unsafe { target.record_between(commands, 0, IN_ROW) }?)
+    Ok(unsafe { target.record_between(commands, 0, in_row()) }?)
 }
 
 /// As [`record`], between recordings of the same target.
 pub(crate) fn record_in_row(
     crowd: &mut Crowd,
     target: &CrowdTarget,
-    commands: ash::vk::CommandBuffer,
+    commands: vk::CommandBuffer,
 ) -> Result<(), CrowdError> {
     // SAFETY: as in `record`; nothing else uses the result's memory.
-    unsafe { crowd.record_between(target, commands, IN_ROW) }
+    unsafe { crowd.record_between(target, commands, in_row()) }
 }
 
 /// Records a pass.
-fn record_pass(target: &PassTarget, commands: ash::vk::CommandBuffer) {
+fn record_pass(target: &PassTarget, commands: vk::CommandBuffer) {
     // The inputs are results of clips, which kernels wrote.
-    let scopes = CommandScopes {
-        before: CommandUsers::KernelsAndCopies,
-        after: CommandUsers::Any,
-    };
+    let scopes = CommandScopes::default().with_before(CommandUsers::KernelsAndCopies);
     // SAFETY: as in `record_clip`; the result's memory is used by passes and clips alone until all is read back.
     unsafe { target.record_between(commands, scopes) }
 }
@@ -237,11 +227,9 @@ pub fn renderer(
     report.validation_messages = renderer.application.validation_messages();
     if let Some(queue) = renderer.application.copy_queue {
         drop(renderer);
-        let options = EngineOptions {
-            transfer: Transfer::Staged,
-            read_back: ReadBack::Overlapped,
-            ..EngineOptions::default()
-        };
+        let options = EngineOptions::default()
+            .with_transfer(Transfer::Staged)
+            .with_read_back(ReadBack::Overlapped);
         let renderer = Renderer::new(device, validation, &options)?;
         report
             .checks
@@ -289,7 +277,7 @@ fn buffer_to_buffer(
             let host = (renderer.application).buffer(room as u64, ApplicationMemory::Host);
             let host = host.map_err(Error::from)?;
             for encoding in Encoding::ALL {
-                if encoding.row().error_bound.is_none() {
+                if !encoding.stores_rotations() {
                     continue; // not for rotations
                 }
                 for layout in [Layout::TrackMajor, Layout::FrameMajor] {
@@ -319,7 +307,7 @@ fn buffer_to_buffer(
                         let found = renderer.bytes(&buffer, &host, offset + expected.len())?;
                         let (before, found) = found.split_at(offset);
                         check.values += (expected.len() / each) as u64;
-                        check.differing += differences(found, &expected, each).0;
+                        check.differing += Differences::of(found, &expected, each).count;
                         check.differing +=
                             before.iter().filter(|&&byte| byte != 0xff).count() as u64;
                         renderer.fill(&buffer)?;
@@ -441,7 +429,7 @@ fn passes(
             let (found, behind) = found[start..].split_at(expected.len());
             let beside = behind.len().min((step - size) as usize);
             check.values += (expected.len() / size_of::<Quat>()) as u64;
-            check.differing += differences(found, expected, size_of::<Quat>()).0;
+            check.differing += Differences::of(found, expected, size_of::<Quat>()).count;
             let changed = behind[..beside].iter().filter(|&&byte| byte != 0xff);
             check.differing += changed.count() as u64;
         }
@@ -526,7 +514,7 @@ fn frames_in_flight(
             for ((_, host), expected) in buffers.iter().zip(&expected) {
                 let found = host.bytes(size as usize).map_err(Error::from)?;
                 check.values += (expected.len() / each) as u64;
-                check.differing += differences(&found, expected, each).0;
+                check.differing += Differences::of(&found, expected, each).count;
             }
             report.checks.push(check);
             drop(targets);
@@ -543,10 +531,12 @@ fn copied_beside(engine: &Engine, cpu: &Engine, seed: u64) -> Result<RendererChe
     let [found, expected] =
         [engine, cpu].map(|engine| engine.evaluate(&set, method::SLERP, &frames));
     let (found, expected) = (found?, expected?);
-    let (found, expected): (&[Quat], &[Quat]) = (found.as_quats(), expected.as_quats());
+    let [found, expected] = [found.as_quats(), expected.as_quats()];
+    let values = expected.len() as u64;
+    let [found, expected] = [found, expected].map(bytemuck::cast_slice);
     Ok(RendererCheck {
         name: "copied on a queue of their own, slerp".to_owned(),
-        values: expected.len() as u64,
-        differing: differences(found, expected, 1).0,
+        values,
+        differing: Differences::of(found, expected, size_of::<Quat>()).count,
     })
 }

@@ -1,10 +1,14 @@
-//! The lab of `tumble lab`: measures on a card what the engine might do otherwise, and says what follows by rules that
-//! were written before (`rules.rs`). A card can be had rarely and for minutes, so nothing is decided by hand.
+//! Measurements within the engine, with its private parts: the variants of kernels that `tumble lab` compares, results
+//! that stay on a device, and reports of a device and of the engine's choices for it. The crate `tumble-verify` names
+//! them for users.
 //!
-//! Every variant of a kernel ([`KernelVariant`]) is first compared with the kernel's twin; one that differs is rejected.
-//! Then the ceilings are measured, which no kernel exceeds, and rows of dispatches of the variants.
+//! The lab ([`lab`]) measures on a card other variants of the engine's kernels, and decides by rules that were written
+//! before (`rules.rs`): a card can be had rarely and for minutes. Every variant of a kernel ([`KernelVariant`]) is first
+//! compared with the kernel's twin; one that differs is rejected. Then the ceilings are measured, which no kernel
+//! exceeds, and rows of dispatches of the variants.
 
 mod bench;
+mod resident;
 mod rules;
 mod variant;
 
@@ -12,9 +16,16 @@ use std::time::Duration;
 
 use crate::engine::Engine;
 use crate::error::Error;
+pub use crate::gpu::engine::figures::{EngineChoices, WriteRates};
+use crate::gpu::instance::loader;
+pub use crate::gpu::physical::details::{
+    DeviceDetails, FloatControlsReport, Limits, MemoryHeap, MemoryType, QueueFamily,
+};
+pub use crate::lab::resident::{Resident, ResidentTime};
+pub use crate::lab::rules::Timed;
+pub use crate::lab::variant::{HalfConversion, KernelVariant, RunList, StoreCaching};
+use crate::machine::error::VulkanError;
 use crate::machine::options::RunLanes;
-pub use crate::verify::lab::rules::Timed;
-pub use crate::verify::lab::variant::{HalfConversion, KernelVariant, RunList, StoreCaching};
 
 /// How much the lab does.
 #[derive(Debug, Clone, Copy)]
@@ -119,6 +130,14 @@ pub struct Decision {
     pub applies: bool,
     /// The decision, in words.
     pub result: String,
+}
+
+/// The functions of the Vulkan loader, found as the engine finds it: also where Homebrew installs it.
+///
+/// # Errors
+/// When there is no loader.
+pub fn load_vulkan() -> Result<ash::Entry, VulkanError> {
+    loader()
 }
 
 /// Compares all variants of the kernels over spread runs with their twins, and measures them. `None` on the CPU. Without

@@ -10,16 +10,14 @@ use crate::gpu::kernel_check::segments::{rotations, spread_trial};
 use crate::gpu::physical::DeviceKind;
 use crate::gpu::pipeline::Pipeline;
 use crate::gpu::submission::Submission;
+use crate::lab::rules::{self, Timed};
+use crate::lab::variant::{KernelVariant, LabKernel, RunList};
+use crate::lab::{Ceiling, Decision, LabOptions, LabReport, LabRow, RejectedVariant, VariantTime};
 use crate::machine::error::VulkanError;
 use crate::machine::options::RunLanes;
 use crate::output::encoding::Encoding;
 use crate::output::rotations::Layout;
 use crate::shader::{Form, IS_CONSTANT, Kernel, NO_KEY, Spread, SpreadRun, Variants};
-use crate::verify::lab::rules::{self, Timed};
-use crate::verify::lab::variant::{KernelVariant, LabKernel, RunList};
-use crate::verify::lab::{
-    Ceiling, Decision, LabOptions, LabReport, LabRow, RejectedVariant, VariantTime,
-};
 use crate::work::lists::WorkChunk;
 use crate::work::lists::spread::{NO_RUN, RunRepetitions, SpreadLanes};
 use crate::work::recording::Users;

@@ -5,15 +5,6 @@
 //! They detect changes that all devices make in the same way, which a comparison of devices cannot show. The inputs
 //! are computed with arithmetic that every machine rounds in the same way. A changed hash breaks the engine's
 //! guarantee.
-//!
-//! ```
-//! use tumble::{Device, Engine, verify::golden::Golden};
-//! let golden = Golden::new();
-//! let engine = Engine::new(Device::Cpu)?;
-//! let (case, name) = (0, golden.name(0));
-//! assert_eq!(Some(&*golden.evaluate(case, &engine)?.hash), Golden::recorded(name));
-//! # Ok::<(), Box<dyn std::error::Error>>(())
-//! ```
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -22,26 +13,15 @@ use std::sync::OnceLock;
 use glam::{DVec3, Quat};
 use sha2::{Digest, Sha256};
 
-use crate::crowd_error::CrowdError;
-use crate::curve::options::{Axes, Ends, KeySigns, Quantity, Speed};
-use crate::engine::Engine;
-use crate::error::Error;
-use crate::method;
-use crate::method::interpolation::Interpolation;
-use crate::method::vector_method::{ScalarQuantity, VectorMethod};
-use crate::method::{METHODS, Method};
-use crate::output::crowd::{CrowdOutput, CrowdValues};
-use crate::output::encoding::Encoding;
-use crate::output::rotations::Layout;
-use crate::path::options::{Direction, Follow, PathFrame};
-use crate::path::speed::PathSpeed;
-use crate::pose::skeleton::Skeleton;
-use crate::smooth::kernel::Smoothing;
-use crate::stream::Chunk;
-use crate::time::frames::SampleTimes;
-use crate::time::wrap::WrapMode;
-use crate::tracks::set::TrackSet;
-use crate::verify::sets::{
+use tumble::crowd::{CrowdError, CrowdOutput, CrowdValues};
+use tumble::paths::{Direction, Follow, PathFrame, PathSpeed};
+use tumble::{
+    Axes, Chunk, Encoding, Ends, Engine, Error, Interpolation, KeySigns, Layout, METHODS, Method,
+    Quantity, SampleTimes, ScalarQuantity, Skeleton, Smoothing, Speed, TrackSet, VectorMethod,
+    WrapMode, method,
+};
+
+use crate::sets::{
     SeededRandom, closed_set, crowd_layer, crowd_library, later, paths_set, random_set,
     scalars_set, shared_set, vectors_set,
 };
@@ -146,10 +126,7 @@ impl Default for Golden {
 
 /// The shortest path, unless the method prescribes the signs of keys, also of those without tangents.
 fn shortest(method: Method) -> Interpolation {
-    Interpolation {
-        signs: method.signs.unwrap_or_default(),
-        ..method.into()
-    }
+    Interpolation::from(method).with_signs(method.signs.unwrap_or_default())
 }
 
 impl Golden {
@@ -222,52 +199,26 @@ impl Golden {
             end: 0.3,
         };
         for method in VectorMethod::ALL {
-            let follow = Follow {
-                method,
-                ..Follow::default()
-            };
+            let follow = Follow::default().with_method(method);
             self.add(
                 "paths",
                 &format!("{method}"),
                 Evaluation::Follow(Box::new(follow)),
             );
         }
-        let c2 = || Follow {
-            method: VectorMethod::C2,
-            ..Follow::default()
-        };
+        let c2 = || Follow::default().with_method(VectorMethod::C2);
         let point = Direction::Point(DVec3::new(9.0, 8.0, -7.0));
         let others = [
-            (
-                "constant",
-                Follow {
-                    speed: PathSpeed::Constant,
-                    ..c2()
-                },
-            ),
+            ("constant", c2().with_speed(PathSpeed::Constant)),
             (
                 "eased ahead",
-                Follow {
-                    speed: eased,
-                    direction: Direction::Ahead(0.7),
-                    ..c2()
-                },
+                c2().with_speed(eased).with_direction(Direction::Ahead(0.7)),
             ),
             (
                 "fixed at",
-                Follow {
-                    frame: PathFrame::Fixed,
-                    direction: point,
-                    ..c2()
-                },
+                c2().with_frame(PathFrame::Fixed).with_direction(point),
             ),
-            (
-                "frenet",
-                Follow {
-                    frame: PathFrame::Frenet,
-                    ..c2()
-                },
-            ),
+            ("frenet", c2().with_frame(PathFrame::Frenet)),
         ];
         for (name, follow) in others {
             self.add("paths", name, Evaluation::Follow(Box::new(follow)));
@@ -285,10 +236,7 @@ impl Golden {
             "savitzky-golay:4:3",
         ] {
             let kernel = name.parse().expect("a kernel");
-            let smoothing = Smoothing {
-                passes: 2,
-                ..Smoothing::new(kernel)
-            };
+            let smoothing = Smoothing::new(kernel).with_passes(2);
             self.add(
                 "vectors",
                 &format!("{name} smoothed"),
@@ -311,10 +259,7 @@ impl Golden {
                 ("velocity body", Quantity::Velocity(Axes::Body)),
                 ("acceleration world", Quantity::Acceleration(Axes::Parent)),
             ] {
-                let interpolation = Interpolation {
-                    quantity,
-                    ..shortest(method)
-                };
+                let interpolation = shortest(method).with_quantity(quantity);
                 self.rows(
                     "uneven",
                     &format!("{method} {name}"),
@@ -363,11 +308,9 @@ impl Golden {
         let modes = WrapMode::ALL;
         for (i, how) in VectorMethod::ALL.into_iter().enumerate() {
             for (j, quantity) in ScalarQuantity::ALL.into_iter().enumerate() {
-                let interpolation = Interpolation {
-                    before: modes[(i + j) % modes.len()],
-                    after: modes[(i + 2 * j + 1) % modes.len()],
-                    ..shortest(method::SLERP)
-                };
+                let interpolation = shortest(method::SLERP)
+                    .with_before(modes[(i + j) % modes.len()])
+                    .with_after(modes[(i + 2 * j + 1) % modes.len()]);
                 let evaluation = Evaluation::Scalars(quantity, how, interpolation, frames.clone());
                 self.add("scalars", &format!("{how} {quantity}"), evaluation);
             }
@@ -398,10 +341,7 @@ impl Golden {
                 method::C2,
                 method::SQUAD,
             ] {
-                let interpolation = Interpolation {
-                    ends,
-                    ..shortest(method)
-                };
+                let interpolation = shortest(method).with_ends(ends);
                 self.rows(
                     "hostile",
                     &format!("{method} {name}"),
@@ -417,10 +357,7 @@ impl Golden {
             method::C2,
             method::SHOEMAKE_1985,
         ] {
-            let interpolation = Interpolation {
-                ends: Ends::Loop,
-                ..shortest(method)
-            };
+            let interpolation = shortest(method).with_ends(Ends::Loop);
             self.rows(
                 "closed",
                 &format!("{method} loop ends"),
@@ -434,10 +371,7 @@ impl Golden {
             method::BESSEL_OVERHAUSER,
             method::C2,
         ] {
-            let interpolation = Interpolation {
-                signs: KeySigns::AsAuthored,
-                ..shortest(method)
-            };
+            let interpolation = shortest(method).with_signs(KeySigns::AsAuthored);
             self.rows(
                 "uneven",
                 &format!("{method} as authored"),
@@ -453,10 +387,7 @@ impl Golden {
             );
         }
         for method in [method::SLERP, method::BESSEL_OVERHAUSER, method::SQUAD] {
-            let interpolation = Interpolation {
-                speed: Speed::Constant,
-                ..shortest(method)
-            };
+            let interpolation = shortest(method).with_speed(Speed::Constant);
             self.rows(
                 "uneven",
                 &format!("{method} constant speed"),
@@ -478,26 +409,16 @@ impl Golden {
         ] {
             for (i, &before) in sides.iter().enumerate() {
                 let after = sides[(i + 1) % 4];
-                let interpolation = Interpolation {
-                    before,
-                    after,
-                    ..shortest(method)
-                };
+                let interpolation = shortest(method).with_before(before).with_after(after);
                 let name = format!("{method} {before:?} {after:?}");
                 self.rows("uneven", &name, interpolation, &frames);
                 self.rows("uneven", &format!("{name} times"), interpolation, &times);
             }
         }
-        let looped = Interpolation {
-            after: WrapMode::Loop,
-            ..shortest(method::SLERP)
-        };
+        let looped = shortest(method::SLERP).with_after(WrapMode::Loop);
         let tomorrow = SampleTimes::fps(60).between(86_400.0, 86_403.0);
         self.rows("uneven", "slerp Loop tomorrow", looped, &tomorrow);
-        let velocity = Interpolation {
-            quantity: Quantity::Velocity(Axes::Parent),
-            ..looped
-        };
+        let velocity = looped.with_quantity(Quantity::Velocity(Axes::Parent));
         self.rows("closed", "slerp velocity Loop", velocity, &frames);
     }
 

@@ -11,7 +11,7 @@ use crate::error::Error;
 use crate::gpu::buffer::{Buffer, Residence};
 use crate::gpu::clip::VulkanClip;
 use crate::gpu::engine::VulkanEngine;
-pub use crate::gpu::engine::figures::WriteRates;
+use crate::gpu::engine::figures::WriteRates;
 use crate::gpu::handles::VulkanBuffer;
 use crate::machine::error::VulkanError;
 use crate::output::encoding::Encoding;

@@ -3,17 +3,10 @@
 
 use glam::{Affine3A, DVec3, Mat3A, Quat, Vec3};
 
-use crate::crowd::layer::{CrowdLayer, LayerBlend};
-use crate::crowd::library::CrowdLibrary;
-use crate::crowd_error::CrowdError;
-use crate::method::Method;
-#[cfg(feature = "prove")]
-use crate::method::slerp::SLERP;
-use crate::method::vector_method::VectorMethod;
-use crate::pose::skeleton::Skeleton;
-use crate::time::wrap::WrapMode;
-use crate::tracks::set::TrackSet;
-use crate::tracks::set::key_data::Tcb;
+use tumble::crowd::{CrowdError, CrowdLayer, CrowdLibrary, LayerBlend};
+#[cfg(feature = "vulkan")]
+use tumble::method::SLERP;
+use tumble::{Method, Skeleton, Tcb, TrackSet, VectorMethod, WrapMode};
 
 /// `SplitMix64` (Steele, Lea, Flood 2014).
 pub(crate) struct SeededRandom(pub(crate) u64);
@@ -242,7 +235,6 @@ pub(crate) fn scalars_set() -> TrackSet {
 }
 
 /// Scalars of many sizes, some of which share their key times, and some of which have tangents, one key or equal keys.
-#[cfg(feature = "prove")]
 pub(crate) fn random_scalars(random: &mut SeededRandom, scalars: usize) -> TrackSet {
     let mut set = TrackSet::new();
     let mut times: Vec<f64> = Vec::new();
@@ -385,7 +377,7 @@ pub(crate) fn crowd_library(
 }
 
 /// A library as games have them: eight clips of two seconds, with a key every thirtieth of a second.
-#[cfg(feature = "prove")]
+#[cfg(feature = "vulkan")]
 pub(crate) fn typical_library(
     random: &mut SeededRandom,
     joints: usize,
@@ -399,31 +391,24 @@ pub(crate) fn typical_library(
 }
 
 /// A layer that plays a clip of [`typical_library`], from anywhere in it.
-#[cfg(feature = "prove")]
+#[cfg(feature = "vulkan")]
 pub(crate) fn typical_layer(random: &mut SeededRandom, library: &CrowdLibrary) -> CrowdLayer {
-    CrowdLayer {
-        clip: random.below(library.clip_count()),
-        time: random.between(0.0, 1e6) as i64,
-        speed: random.pick(&[0.9, 1.0, 1.0, 1.1]),
-        wrap: WrapMode::Loop,
-        weight: 1.0,
-        blend: LayerBlend::Over,
-        mask: None,
-    }
+    CrowdLayer::new(random.below(library.clip_count()))
+        .at(random.between(0.0, 1e6) as i64)
+        .with_speed(random.pick(&[0.9, 1.0, 1.0, 1.1]))
 }
 
 /// A random layer of an instance.
 pub(crate) fn crowd_layer(random: &mut SeededRandom, library: &CrowdLibrary) -> CrowdLayer {
-    CrowdLayer {
-        clip: random.below(library.clip_count()),
-        time: random.between(-3e6, 3e6) as i64,
-        speed: random.pick(&[0.0, 1.0, 1.0, -1.0, 0.37, -2.25, 100.0]),
-        wrap: random.pick(&[WrapMode::Hold, WrapMode::Loop, WrapMode::Mirror]),
-        weight: random.pick(&[0.0, 1.0, 0.25, 0.7]),
-        blend: match random.next().is_multiple_of(2) {
+    // In this order, in which the recorded crowds draw their numbers.
+    CrowdLayer::new(random.below(library.clip_count()))
+        .at(random.between(-3e6, 3e6) as i64)
+        .with_speed(random.pick(&[0.0, 1.0, 1.0, -1.0, 0.37, -2.25, 100.0]))
+        .with_wrap(random.pick(&[WrapMode::Hold, WrapMode::Loop, WrapMode::Mirror]))
+        .with_weight(random.pick(&[0.0, 1.0, 0.25, 0.7]))
+        .with_blend(match random.next().is_multiple_of(2) {
             true => LayerBlend::Additive,
             false => LayerBlend::Over,
-        },
-        mask: random.pick(&[None, Some(0), Some(1)]),
-    }
+        })
+        .with_mask(random.pick(&[None, Some(0), Some(1)]))
 }

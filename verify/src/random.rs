@@ -6,23 +6,15 @@ use std::mem::discriminant;
 
 use sha2::{Digest, Sha256};
 
-use crate::crowd_error::CrowdError;
-use crate::curve::options::{Axes, Ends, KeySigns, Quantity, Speed};
-use crate::engine::Engine;
-use crate::error::Error;
-use crate::method::interpolation::Interpolation;
-use crate::method::vector_method::{ScalarQuantity, VectorMethod};
-use crate::method::{self, METHODS};
-use crate::output::crowd::{CrowdOutput, CrowdValues};
-use crate::output::encoding::Encoding;
-use crate::output::rotations::Layout;
-use crate::time::frame_rate::FrameRate;
-use crate::time::frames::SampleTimes;
-use crate::time::wrap::WrapMode;
-use crate::tracks::set::TrackSet;
-use crate::verify::differences;
-use crate::verify::golden::GoldenError;
-use crate::verify::sets::{
+use tumble::crowd::{CrowdError, CrowdOutput, CrowdValues};
+use tumble::{
+    Axes, Encoding, Ends, Engine, Error, FrameRate, Interpolation, KeySigns, Layout, METHODS,
+    Method, Quantity, SampleTimes, ScalarQuantity, Speed, TrackSet, VectorMethod, WrapMode, method,
+};
+
+use crate::differences::Differences;
+use crate::golden::GoldenError;
+use crate::sets::{
     SeededRandom, crowd_layer, crowd_library, later, random_scalars, random_set, shared_set,
 };
 
@@ -49,14 +41,6 @@ pub struct RandomRound {
 /// Both engines evaluate it, and every bit is compared. If both refuse a combination with the same kind of error,
 /// nothing is compared, and the description says so.
 ///
-/// ```
-/// use tumble::{Device, Engine, verify::random::round};
-/// let cpu = Engine::new(Device::Cpu)?;
-/// let found = round(&cpu, &cpu, 1, 0)?;
-/// assert_eq!(found.differing, 0);
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
-///
 /// # Errors
 /// When the device fails, or refuses a request that the CPU accepts.
 pub fn round(
@@ -81,14 +65,6 @@ const SCALAR_SAMPLES: usize = 781;
 
 /// Compares scalars of a seed by every method, as values, velocities and accelerations: keys at common and at separate
 /// times, with tangents and without, held, repeated, mirrored and extrapolated outside, at rates and at listed times.
-///
-/// ```
-/// use tumble::{Device, Engine, verify::random::scalars_round};
-/// let cpu = Engine::new(Device::Cpu)?;
-/// let found = scalars_round(&cpu, &cpu, 1)?;
-/// assert!(found.values >= 1 << 20 && found.differing == 0);
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
 ///
 /// # Errors
 /// When the device fails, or refuses a request that the CPU accepts.
@@ -132,18 +108,13 @@ pub fn scalars_round(device: &Engine, cpu: &Engine, seed: u64) -> Result<RandomR
 
 /// Compares two results of values of `size` bytes each.
 fn compared(description: String, found: &[u8], expected: &[u8], size: usize) -> RandomRound {
-    let (mut differing, mut first_difference) = differences(found, expected, size);
-    if found.len() != expected.len() {
-        let shorter = found.len().min(expected.len()) / size;
-        differing += found.len().abs_diff(expected.len()).div_ceil(size) as u64;
-        first_difference = first_difference.or(Some(shorter));
-    }
+    let differences = Differences::of(found, expected, size);
     RandomRound {
         description,
         values: (expected.len() / size) as u64,
         bytes: expected.len() as u64,
-        differing,
-        first_difference,
+        differing: differences.count,
+        first_difference: differences.first,
         hash: Sha256::digest(expected).into(),
     }
 }
@@ -189,8 +160,7 @@ fn set_round(
         true => random.pick(&Encoding::ALL),
         false => Encoding::F32,
     };
-    let stores_rotations = encoding.row().error_bound.is_some();
-    let encoding = if stores_rotations {
+    let encoding = if encoding.stores_rotations() {
         encoding
     } else {
         Encoding::F32
@@ -361,7 +331,7 @@ fn crowd_round(
     cpu: &Engine,
     random: &mut SeededRandom,
 ) -> Result<RandomRound, GoldenError> {
-    const MIXES: [&[crate::method::Method]; 3] = [
+    const MIXES: [&[Method]; 3] = [
         &[method::SLERP],
         &[method::SLERP, method::STEP],
         &[
@@ -380,7 +350,10 @@ fn crowd_round(
         CrowdValues::Skinning,
     ]);
     let is_half = random.below(3) == 0;
-    let output = CrowdOutput { values, is_half };
+    let output = match is_half {
+        true => CrowdOutput::half(values),
+        false => CrowdOutput::from(values),
+    };
     let library = crowd_library(random, joints, methods)?;
     let plays: Vec<_> = (0..instances * layers)
         .map(|_| crowd_layer(random, &library))
@@ -415,12 +388,14 @@ fn crowd_round(
 
 #[cfg(test)]
 mod tests {
+    use tumble::Device;
+
     use super::*;
 
     /// Each engine reports the first track that one of its threads refuses; a set that only one refuses is an error.
     #[test]
     fn both_may_refuse_in_other_words() {
-        let cpu = Engine::new(crate::device::Device::Cpu).expect("threads");
+        let cpu = Engine::new(Device::Cpu).expect("threads");
         let lengths =
             [(1, 2), (3, 4)].map(|(length, needed)| Error::OutputLength { length, needed });
         let mut words = lengths.into_iter();
@@ -435,18 +410,5 @@ mod tests {
             false => Ok(Vec::new()),
         };
         assert!(both(one, [&cpu, &cpu]).is_err());
-    }
-
-    /// A comparison that cannot fail proves nothing.
-    #[test]
-    fn a_bit_that_differs_is_found_and_a_result_that_is_too_short() {
-        let expected = [7u8; 64];
-        let mut found = expected;
-        found[33] ^= 1;
-        let round = compared(String::new(), &found, &expected, 16);
-        assert_eq!((round.values, round.differing), (4, 1));
-        assert_eq!(round.first_difference, Some(2));
-        let round = compared(String::new(), &expected[..48], &expected, 16);
-        assert_eq!((round.differing, round.first_difference), (1, Some(3)));
     }
 }
