@@ -11,6 +11,7 @@ use crate::arrays::{ArrayValues, ListArgument, doubles};
 use crate::clip::Clip;
 use crate::engine::{Engine, default_engine};
 use crate::errors::{guarded, input, warn_of};
+use crate::events::{ClipEvent, PassedEvent};
 use crate::motions::{
     ChosenSkeleton, ListedClip, SharedSkeleton, fitted, of_crowd, of_pushed, order_assumption,
 };
@@ -29,14 +30,16 @@ const MANY: usize = 1 << 20;
 /// Many instances of a skeleton, each of which plays clips at a separate time and speed: poses for skinning.
 ///
 /// `Crowd(clips, instances, *, layers=1, method="slerp", parents=None, offsets=None, masks=None,
-/// inverse_bind=None, references=None, ticks_per_second=705600, storage="segments", engine=None)`
+/// inverse_bind=None, references=None, events=None, ticks_per_second=705600, storage="segments",
+/// engine=None)`
 ///
 /// `clips`: clips of one skeleton, whose joints are matched by name, by index only if no clip has names. The skeleton
 /// is that of the first clip, or given by `parents` and `offsets` for its tracks; without `offsets` each clip keeps its
 /// own. A clip that has parents but no offsets can only be evaluated as "rotations". `layers`: the number of layers of an instance, 1 to 4, each blended over the ones below. `masks`: lists of a weight from 0 to 1
 /// for each joint, by which a layer's weight is multiplied. `inverse_bind`: (joints, 3, 4) or (joints, 4, 4), for the
 /// values "skinning". `references`: {clip: (other clip, seconds)}, the reference pose for additive layers of a clip;
-/// the default is the first pose of the clip. `storage`: "segments", or "compact" for a third to a sixth of the memory
+/// the default is the first pose of the clip. `events`: a list of `ClipEvent`, the moments that `passed_events`
+/// reports. `storage`: "segments", or "compact" for a third to a sixth of the memory
 /// where keys are close; poses have the same bits and take longer.
 ///
 /// All instances follow one clock, which counts whole ticks: a clip in a loop gives the same bits in the
@@ -101,9 +104,9 @@ impl Crowd {
     #[new]
     #[pyo3(signature = (
         clips, instances, *, layers=1, method="slerp", parents=None, offsets=None, masks=None,
-        inverse_bind=None, references=None, ticks_per_second=TICKS, storage="segments",
+        inverse_bind=None, references=None, events=None, ticks_per_second=TICKS, storage="segments",
         engine=None
-    ), text_signature = "(clips, instances, *, layers=1, method='slerp', parents=None, offsets=None, masks=None, inverse_bind=None, references=None, ticks_per_second=705600, storage='segments', engine=None)")]
+    ), text_signature = "(clips, instances, *, layers=1, method='slerp', parents=None, offsets=None, masks=None, inverse_bind=None, references=None, events=None, ticks_per_second=705600, storage='segments', engine=None)")]
     #[allow(clippy::too_many_arguments, reason = "keywords")]
     fn new(
         py: Python<'_>,
@@ -116,6 +119,7 @@ impl Crowd {
         masks: Option<ListArgument<ListArgument<f32>>>,
         inverse_bind: Option<&Bound<'_, PyAny>>,
         references: Option<&Bound<'_, PyDict>>,
+        events: Option<ListArgument<ClipEvent>>,
         ticks_per_second: u32,
         storage: &str,
         engine: Option<&Bound<'_, Engine>>,
@@ -143,11 +147,26 @@ impl Crowd {
         let unplaced = ListedClip::all(&clips).find_map(|listed| shared.unplaced(listed));
         let inverse_bind = inverse_bind.map(|value| matrices(value, joints));
         let inverse_bind = inverse_bind.transpose()?;
-        let mut poses: Vec<(usize, usize, f64)> = Vec::new();
+        let tick_of = |seconds: f64, name: &str| {
+            let ticks = (seconds * f64::from(ticks_per_second)).round();
+            match (0.0..=f64::from(u32::MAX)).contains(&ticks) {
+                true => Ok(ticks as u32),
+                false => Err(input(format!(
+                    "{name}: {seconds} s; give a time from 0 to the clip's length"
+                ))),
+            }
+        };
+        let mut poses: Vec<(usize, usize, u32)> = Vec::new();
         for (clip, reference) in references.into_iter().flatten() {
             let (from, seconds): (usize, f64) = reference.extract()?;
-            poses.push((clip.extract()?, from, seconds));
+            poses.push((clip.extract()?, from, tick_of(seconds, "references")?));
         }
+        let events = events.map_or_else(Vec::new, |events| events.0);
+        let moments = events.iter().enumerate().map(|(index, event)| {
+            let tick = tick_of(event.time, &format!("events[{index}]"))?;
+            Ok((event.clip, tick, event.name.clone()))
+        });
+        let moments: Vec<(usize, u32, String)> = moments.collect::<PyResult<_>>()?;
         let engine = match engine {
             Some(engine) => engine.get().engine_for(1)?,
             None => default_engine(py)?.get().engine_for(1)?,
@@ -172,10 +191,13 @@ impl Crowd {
                     let set = library.set_inverse_bind(matrices);
                     set.map_err(|error| input(format!("inverse_bind: {error}")))?;
                 }
-                for (clip, from, seconds) in poses {
-                    let tick = (seconds * f64::from(ticks_per_second)).round();
-                    let set = library.set_reference(clip, from, tick as u32);
+                for (clip, from, tick) in poses {
+                    let set = library.set_reference(clip, from, tick);
                     set.map_err(|error| input(format!("references: {error}")))?;
+                }
+                for (index, (clip, tick, name)) in moments.into_iter().enumerate() {
+                    let pushed = library.push_event(clip, tick, name);
+                    pushed.map_err(|error| input(format!("events[{index}]: {error}")))?;
                 }
                 engine.crowd(&library, instances, layers).map_err(of_crowd)
             })
@@ -272,6 +294,28 @@ impl Crowd {
         py.detach(|| guarded(|| self.lock().advance(seconds).map_err(of_crowd)))
     }
 
+    /// The events that the layers of all instances passed after the time `since` of the clock in ticks, up to now: a
+    /// list of `PassedEvent`, in the order of their times, then of instances, layers and events.
+    ///
+    /// A layer passes an event when its time in the clip reaches that of the event, in either direction, and in a loop
+    /// once in each round. One large step passes the same events as many small ones. The clips that the layers play now
+    /// count: call this after `advance` and before `set`. Layers of weight 0 pass events, too.
+    ///
+    /// >>> import tumble
+    /// >>> door = tumble.Clip([0.0, 2.0], [[[0, 0, 0, 1], [0, 0, 1, 0]]], parents=[None])
+    /// >>> crowd = tumble.Crowd([door], 2, events=[tumble.ClipEvent(0, 0.5, "creaks")])
+    /// >>> crowd.set([1], 0)
+    /// >>> before = crowd.clock
+    /// >>> crowd.advance(3.0)
+    /// >>> for passed in crowd.passed_events(before):
+    /// ...     print(crowd.events[passed.event].name, passed.instance, passed.clock / crowd.ticks_per_second)
+    /// creaks 1 0.5
+    /// creaks 1 2.5
+    fn passed_events(&self, py: Python<'_>, since: u64) -> PyResult<Vec<PassedEvent>> {
+        let passed = py.detach(|| guarded(|| self.lock().passed_events(since).map_err(of_crowd)));
+        Ok(passed?.into_iter().map(PassedEvent::from).collect())
+    }
+
     /// The poses of all instances at the clock's time: (instances, joints, 3, 4), for column vectors, the
     /// last column the translation; or of "rotations" (instances, joints, 4), x y z w.
     ///
@@ -353,6 +397,32 @@ impl Crowd {
             times.collect::<PyResult<Vec<f64>>>()
         })?;
         Ok(numpy::PyArray1::from_vec(py, found).into_any())
+    }
+
+    /// The events of the clips, in the order in which they were given; their times are rounded to ticks.
+    #[getter]
+    fn events(&self) -> Vec<ClipEvent> {
+        let crowd = self.lock();
+        let library = crowd.library();
+        let second = f64::from(library.ticks_per_second());
+        let events = library.events().iter().map(|event| ClipEvent {
+            clip: event.clip,
+            time: f64::from(event.tick) / second,
+            name: event.name.clone(),
+        });
+        events.collect()
+    }
+
+    /// The clock's time in ticks.
+    #[getter]
+    fn clock(&self) -> u64 {
+        self.lock().clock()
+    }
+
+    /// Ticks of the clock in a second.
+    #[getter]
+    fn ticks_per_second(&self) -> u32 {
+        self.lock().library().ticks_per_second()
     }
 
     /// Number of instances.

@@ -19,6 +19,7 @@ mod dlpack;
 mod engine;
 mod errors;
 mod evaluate;
+mod events;
 mod features;
 mod file;
 mod follow;
@@ -67,6 +68,8 @@ mod _tumble {
     use crate::device_motions::DeviceMotions;
     #[pymodule_export]
     use crate::engine::Engine;
+    #[pymodule_export]
+    use crate::events::{ClipEvent, PassedEvent};
     #[pymodule_export]
     use crate::features::{
         contacts, heading, humanml3d, mirror_pairs, mirrored_positions, mirrored_rotations,

@@ -8,6 +8,7 @@ use crate::compare::{
     PathStatistics, Spread,
 };
 use crate::errors::guarded;
+use crate::events::{ClipEvent, PassedEvent};
 use crate::reduce::Reduction;
 use crate::route::{Route, Surface, Walk};
 use crate::stream::Chunk;
@@ -22,12 +23,14 @@ fn made<'py, T: Value>(state: &Bound<'py, PyTuple>) -> PyResult<Bound<'py, PyAny
 }
 
 /// The classes that can be unpickled, by name.
-const MAKERS: [(&str, Maker); 13] = [
+const MAKERS: [(&str, Maker); 15] = [
     ("ArrayDifference", made::<ArrayDifference>),
     ("ChannelDifference", made::<ChannelDifference>),
     ("Chunk", made::<Chunk>),
     ("ClipDifference", made::<ClipDifference>),
+    ("ClipEvent", made::<ClipEvent>),
     ("JointDifference", made::<JointDifference>),
+    ("PassedEvent", made::<PassedEvent>),
     ("PathErrors", made::<PathErrors>),
     ("PathStatistics", made::<PathStatistics>),
     ("Reduction", made::<Reduction>),

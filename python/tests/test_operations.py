@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import pickle
 import subprocess
 import sys
 
@@ -734,6 +735,41 @@ def test_layers_masks_and_skinning(walks, engine, rng):
         (lambda: tumble.Crowd(walks, 1).evaluate("skinning"), "give `inverse_bind`"),
         (lambda: tumble.Crowd([], 1), "clips: give at least one"),
         (lambda: tumble.Crowd([tumble.Clip(TIMES, unit(rng, 4))], 1), r"clips\[0\]: it has no skeleton"),
+    ]:
+        with pytest.raises(tumble.InputError, match=message):
+            call()
+
+
+def test_events_are_passed_when_their_ticks_are_reached(walks, engine):
+    events = [tumble.ClipEvent(0, 0.25, "left"), tumble.ClipEvent(1, 1.0, "right"), tumble.ClipEvent(0, 0.75)]
+    crowd = tumble.Crowd(walks, 3, layers=2, events=events, ticks_per_second=1000, engine=engine)
+    assert crowd.events == events and crowd.ticks_per_second == 1000
+    crowd.set([0, 2], 0, time=[0.0, 0.7])
+    crowd.set([1], 1, layer=1, weight=0.5, speed=2.0)
+    crowd.advance(0.1)
+    before = crowd.clock
+    assert [(p.clock, p.instance, p.event) for p in crowd.passed_events(0)] == [(50, 2, 2)] and before == 100
+    crowd.advance(0.5)
+    whole = crowd.passed_events(before)
+    found = [(passed.clock, passed.instance, passed.layer, passed.event, passed.weight) for passed in whole]
+    # Instance 2 begins its loop of one second again at 300.
+    assert found == [(250, 0, 0, 0, 1.0), (500, 1, 1, 1, 0.5), (550, 2, 0, 0, 1.0)]
+    parts = tumble.Crowd(walks, 3, layers=2, events=events, ticks_per_second=1000, engine=engine)
+    parts.set([0, 2], 0, time=[0.0, 0.7])
+    parts.set([1], 1, layer=1, weight=0.5, speed=2.0)
+    many = []
+    for step in range(60):
+        since = parts.clock
+        parts.advance(0.01)
+        many += [passed for passed in parts.passed_events(since) if step >= 10]
+    assert many == whole
+    assert pickle.loads(pickle.dumps((events, whole))) == (events, whole)
+    for call, message in [
+        (lambda: crowd.passed_events(601), "events since 601 ticks, but the clock is at 600"),
+        (lambda: tumble.Crowd(walks, 1, events=[tumble.ClipEvent(0, 1.5)]), r"events\[0\]: the event is at tick 1058400"),
+        (lambda: tumble.Crowd(walks, 1, events=[tumble.ClipEvent(7, 0.0)]), r"events\[0\]: there is no clip 7"),
+        (lambda: tumble.Crowd(walks, 1, events=[tumble.ClipEvent(0, np.nan)]), r"events\[0\]: NaN s; give a time from 0"),
+        (lambda: tumble.Crowd(walks, 1, references={1: (0, -0.5)}), r"references: -0.5 s; give a time from 0"),
     ]:
         with pytest.raises(tumble.InputError, match=message):
             call()

@@ -1951,6 +1951,43 @@ class Sampler:
         """The rotations at a time in seconds: float32, (tracks, 4), unit quaternions."""
 
 @final
+class ClipEvent:
+    """A moment of a clip of a crowd, such as a step or the throw of a ball: for `Crowd(events=)`."""
+    def __new__(cls, clip: int, time: float, name: str = "") -> ClipEvent: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    __hash__: ClassVar[None]  # type: ignore[assignment]
+    @property
+    def clip(self) -> int:
+        """The index of the clip in the crowd."""
+    @property
+    def time(self) -> float:
+        """The time in seconds from the clip's first key."""
+    @property
+    def name(self) -> str:
+        """The name."""
+
+@final
+class PassedEvent:
+    """An event that a layer of an instance passed: of `Crowd.passed_events`."""
+    def __eq__(self, other: object, /) -> bool: ...
+    __hash__: ClassVar[None]  # type: ignore[assignment]
+    @property
+    def clock(self) -> int:
+        """The clock's time in ticks at which the layer reached the event."""
+    @property
+    def instance(self) -> int:
+        """The instance."""
+    @property
+    def layer(self) -> int:
+        """The layer."""
+    @property
+    def event(self) -> int:
+        """The event's index in `Crowd.events`."""
+    @property
+    def weight(self) -> float:
+        """The weight of the layer now, from 0 to 1."""
+
+@final
 class Crowd:
     """Many instances of a skeleton, each of which plays clips at a separate time and speed: poses for skinning."""
     def __new__(
@@ -1965,10 +2002,20 @@ class Crowd:
         masks: Sequence[Sequence[float]] | None = None,
         inverse_bind: ArrayLike | None = None,
         references: dict[int, tuple[int, float]] | None = None,
+        events: Sequence[ClipEvent] | None = None,
         ticks_per_second: int = 705600,
         storage: Literal["segments", "compact"] = "segments",
         engine: Engine | None = None,
     ) -> Crowd: ...
+    @property
+    def events(self) -> list[ClipEvent]:
+        """The events of the clips, in the order in which they were given; their times are rounded to ticks."""
+    @property
+    def clock(self) -> int:
+        """The clock's time in ticks."""
+    @property
+    def ticks_per_second(self) -> int:
+        """Ticks of the clock in a second."""
     @property
     def bytes_per_key(self) -> float:
         """Bytes of the clips divided by the number of their keys, on the CPU and on devices."""
@@ -1997,6 +2044,9 @@ class Crowd:
         """Sets what instances play from now on."""
     def advance(self, seconds: float) -> None:
         """Moves the clock on, by the ticks nearest to some seconds."""
+    def passed_events(self, since: int) -> list[PassedEvent]:
+        """The events that the layers of all instances passed after the time `since` of the clock in ticks, up to now: a
+        list of `PassedEvent`, in the order of their times, then of instances, layers and events."""
     @overload
     def evaluate(
         self,
