@@ -3,6 +3,7 @@
 use crate::curve::options::InterpolationError;
 use crate::machine::error::VulkanError;
 use crate::memory::OutOfMemoryError;
+use crate::names::counted;
 use crate::output::encoding::Encoding;
 use crate::output::pose_error::OFFSET_STEP;
 use crate::prepare::error::SetError;
@@ -105,7 +106,7 @@ pub enum CrowdError {
     #[error(transparent)]
     Interpolation(#[from] InterpolationError),
     /// The number of a mask's weights, or of inverse bind matrices, differs from the number of joints.
-    #[error("{count} {subject} were given for {joints} joints; give one for each")]
+    #[error("{count} {subject} for {}; give one for each", counted(*.joints, "joint"))]
     Joints {
         /// `weights` or the matrices.
         subject: &'static str,
@@ -205,7 +206,7 @@ pub enum CrowdError {
         seconds: f64,
     },
     /// The output is not exactly as long as the result.
-    #[error("the output has {length} values; the result has {needed}")]
+    #[error("the output has {}; the result has {needed}", counted(*.length, "value"))]
     OutputLength {
         /// The number of the output's values.
         length: usize,

@@ -6,7 +6,7 @@ use crate::crowd_error::CrowdError;
 use crate::curve::options::{InterpolationError, Quantity};
 use crate::machine::error::{EvaluateError, VulkanError};
 use crate::memory::OutOfMemoryError;
-use crate::names::UnknownNameError;
+use crate::names::{UnknownNameError, counted};
 use crate::output::encoding::{Encoding, EncodingLengthError};
 use crate::output::pose_error::{PoseError, SkeletonError};
 use crate::path::options::FollowError;
@@ -44,7 +44,7 @@ pub enum Error {
     #[error(transparent)]
     EncodingLength(#[from] EncodingLengthError),
     /// The output is not exactly as long as the result.
-    #[error("the output has room for {length} rotations; the result has {needed}")]
+    #[error("the output has room for {}; the result has {needed}", counted(*.length, "rotation"))]
     OutputLength {
         /// The number of the output's values.
         length: usize,
@@ -60,7 +60,7 @@ pub enum Error {
         needed: usize,
     },
     /// The output of an encoded result is not exactly as long as the result.
-    #[error("the output has {length} bytes; the result has {needed}")]
+    #[error("the output has {}; the result has {needed}", counted(*.length, "byte"))]
     OutputBytes {
         /// The length of the output in bytes.
         length: usize,

@@ -214,7 +214,7 @@ fn passes_give_the_bits_of_the_cpu() {
                 fails(
                     refused,
                     TumbleResult::InvalidArgument,
-                    "4 weights were given",
+                    "4 weights, and the pass takes",
                 );
                 done(tumble_pass_target_free(target));
                 let refused = tumble_pass_record(target, null_mut());

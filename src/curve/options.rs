@@ -7,7 +7,7 @@ use std::str::FromStr;
 use glam::Quat;
 
 use crate::math::quaternion::{self, dot, length, log, unit};
-use crate::names::{UnknownNameError, named, names};
+use crate::names::{UnknownNameError, counted, named, names};
 use crate::tracks::set::TrackSet;
 use crate::tracks::set::key_data::LARGEST_TCB;
 use crate::tracks::signs::Signs;
@@ -300,7 +300,7 @@ pub enum InterpolationWarning {
     /// The angular acceleration of [`C2`](crate::method::c2::C2) jumps, because no velocities that make it continuous
     /// were found.
     #[error(
-        "track {track}: c2 found no curve with continuous angular acceleration; it jumps at {count} keys, the first is key {key}; add keys in long intervals beside short ones, or use bessel-overhauser"
+        "track {track}: c2 found no curve with continuous angular acceleration; it jumps at {}, the first is key {key}; add keys in long intervals beside short ones, or use bessel-overhauser", counted(*.count, "key")
     )]
     AccelerationJumps {
         /// The track's index in the set.

@@ -5,6 +5,7 @@ use std::fmt;
 use glam::Vec3;
 
 use crate::memory::OutOfMemoryError;
+use crate::names::counted;
 use crate::output::rotations::Layout;
 
 /// Why poses cannot be combined as requested. Indices count from 0.
@@ -44,7 +45,7 @@ pub enum PoseError {
         weight: f32,
     },
     /// The number of weights does not fit the pass.
-    #[error("{weights} weights were given, and the pass takes {needed}; give one for each")]
+    #[error("{}, and the pass takes {needed}; give one for each", counted(*.weights, "weight"))]
     WeightCount {
         /// The number of weights.
         weights: usize,
@@ -52,7 +53,7 @@ pub enum PoseError {
         needed: usize,
     },
     /// The number of an additive layer's reference rotations is not the number of tracks.
-    #[error("{references} reference rotations were given for {tracks} tracks; give one for each")]
+    #[error("{} for {}; give one for each", counted(*.references, "reference rotation"), counted(*.tracks, "track"))]
     References {
         /// The number of reference rotations.
         references: usize,
@@ -60,7 +61,7 @@ pub enum PoseError {
         tracks: usize,
     },
     /// The number of weights is not the number of rotations.
-    #[error("{weights} weights were given for {rotations} rotations; give one for each")]
+    #[error("{} for {}; give one for each", counted(*.weights, "weight"), counted(*.rotations, "rotation"))]
     RotationWeights {
         /// The number of weights.
         weights: usize,
@@ -69,7 +70,7 @@ pub enum PoseError {
     },
     /// The skeleton's number of tracks differs from the poses'.
     #[error(
-        "the skeleton has {skeleton_tracks} tracks, the poses have {tracks}; give one that has as many"
+        "the skeleton has {}, the poses have {tracks}; give one that has as many", counted(*.skeleton_tracks, "track")
     )]
     Skeleton {
         /// The number of the skeleton's tracks.
@@ -105,7 +106,7 @@ pub enum PoseError {
         input: usize,
     },
     /// `has_translation` does not have one entry for each track.
-    #[error("`has_translation` has {entries} entries for {tracks} tracks; give one for each")]
+    #[error("`has_translation` has {} for {}; give one for each", counted(*.entries, "entry"), counted(*.tracks, "track"))]
     HasTranslation {
         /// The number of entries.
         entries: usize,
@@ -114,7 +115,7 @@ pub enum PoseError {
     },
     /// The number of inverse bind matrices differs from the number of tracks.
     #[error(
-        "{matrices} inverse bind matrices were given for {tracks} tracks; give one for each, or none"
+        "{matrices} inverse bind matrices for {}; give one for each, or none", counted(*.tracks, "track")
     )]
     InverseBind {
         /// The number of matrices.
@@ -229,7 +230,7 @@ pub enum SkeletonError {
         track: usize,
     },
     /// There is not one name for each track.
-    #[error("{names} names for {tracks} tracks; give one for each")]
+    #[error("{} for {}; give one for each", counted(*.names, "name"), counted(*.tracks, "track"))]
     Names {
         /// The number of names.
         names: usize,

@@ -7,7 +7,7 @@ use glam::{Quat, Vec3, Vec4};
 
 use crate::math::canonical::canonical;
 use crate::memory::OutOfMemoryError;
-use crate::names::names;
+use crate::names::{counted, names};
 use crate::output::buffer::OutputBuffer;
 use crate::tracks::error::NORM_TOLERANCE;
 use crate::tracks::rotation::Rotation;
@@ -97,7 +97,7 @@ pub type Vectors = Samples<Vec3>;
 pub enum SamplesError {
     /// The number of values is not a multiple of the number of tracks.
     #[error(
-        "{values} values do not divide among {tracks} tracks; give every track the same number"
+        "{} do not divide among {}; give every track the same number", counted(*.values, "value"), counted(*.tracks, "track")
     )]
     Uneven {
         /// Number of values.

@@ -17,7 +17,7 @@ use std::ops::Range;
 
 use glam::{DQuat, DVec3};
 
-use crate::names::names;
+use crate::names::{counted, names};
 use crate::reduce::inserted::inserted;
 use crate::reduce::intervals::longest;
 use crate::reduce::value::Value;
@@ -64,7 +64,7 @@ pub struct ReducedKeys<T> {
 #[non_exhaustive]
 pub enum ReduceError {
     /// The numbers of samples and of times differ.
-    #[error("there are {samples} samples and {times} times; give a time for each sample")]
+    #[error("{} and {}; give a time for each sample", counted(*.samples, "sample"), counted(*.times, "time"))]
     Lengths {
         /// The number of samples.
         samples: usize,

@@ -1,5 +1,7 @@
 //! Errors of sample times.
 
+use crate::names::counted;
+
 /// The maximum number of samples of one track; more are refused.
 pub const MAX_FRAMES: u64 = 1 << 40;
 
@@ -38,7 +40,11 @@ pub enum SampleTimesError {
     },
     /// The number of times for each track ([`SampleTimes::at_each`](crate::time::frames::SampleTimes::at_each)) is
     /// not a multiple of the number of tracks.
-    #[error("{times} times do not divide among {tracks} tracks; give every track the same number")]
+    #[error(
+        "{} do not divide among {}; give every track the same number",
+        counted(*.times, "time"),
+        counted(*.tracks, "track")
+    )]
     Uneven {
         /// The number of times.
         times: usize,
@@ -46,7 +52,11 @@ pub enum SampleTimesError {
         tracks: usize,
     },
     /// The number of times differs from the number of samples that a target was made for.
-    #[error("{times} times; the target has {samples} samples of each track")]
+    #[error(
+        "{}; the target has {} of each track",
+        counted(*.times, "time"),
+        counted(*.samples, "sample")
+    )]
     Count {
         /// The number of times.
         times: usize,

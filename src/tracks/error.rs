@@ -1,5 +1,7 @@
 //! Errors of sets, and the limits in their messages.
 
+use crate::names::counted;
+
 /// The maximum difference of a key's norm from 1. [`TrackSet::push`](crate::tracks::set::TrackSet::push) refuses
 /// other keys, because they are probably not rotations.
 pub const NORM_TOLERANCE: f64 = 0.1;
@@ -19,7 +21,7 @@ pub enum TrackError {
         track: usize,
     },
     /// The numbers of keys and of times differ.
-    #[error("track {track} has {keys} keys but {times} times; give one time for each key")]
+    #[error("track {track} has {} but {}; give one time for each key", counted(*.keys, "key"), counted(*.times, "time"))]
     LengthMismatch {
         /// The track's index in the set.
         track: usize,
@@ -84,7 +86,7 @@ pub enum TrackError {
     },
     /// Data in addition to rotations, such as velocities, are not one value for each key.
     #[error(
-        "track {track} has {keys} keys but {values} values of {quantity}; give one for each key"
+        "track {track} has {} but {} of {quantity}; give one for each key", counted(*.keys, "key"), counted(*.values, "value")
     )]
     DataLength {
         /// The track's index in the set.

@@ -1,5 +1,7 @@
 //! Values that all tracks of a set share, or that each track has.
 
+use crate::names::counted;
+
 /// A value for all tracks of a set, or one for each track.
 ///
 /// Functions that take it also take the value alone, or a list:
@@ -40,7 +42,7 @@ pub struct TrackGroup<T> {
 /// A list of values is not as long as the list of tracks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "a list of {values} is given for {tracks} tracks; give one for each track, or a single one for all"
+    "a list of {values} is given for {}; give one for each track, or a single one for all", counted(*.tracks, "track")
 )]
 #[non_exhaustive]
 pub struct PerTrackCountError {

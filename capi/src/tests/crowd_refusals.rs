@@ -184,7 +184,7 @@ fn libraries_refuse_what_does_not_fit() {
         let masked = tumble_crowd_library_push_mask(library, weights.as_ptr(), 4, null_mut());
         fails(masked, input, "joint 1 has the weight 2");
         let masked = tumble_crowd_library_push_mask(library, weights.as_ptr(), 3, null_mut());
-        fails(masked, input, "3 weights were given for 4 joints");
+        fails(masked, input, "3 weights for 4 joints");
         let bound = tumble_crowd_library_set_inverse_bind(library, dangling(), usize::MAX / 12);
         fails(bound, TumbleResult::InvalidArgument, "no memory holds");
         let bound = tumble_crowd_library_set_inverse_bind(library, null(), 4);

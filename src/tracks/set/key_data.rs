@@ -169,7 +169,7 @@ mod tests {
         let too_few = set.set_velocities(1, &[DVec3::X]);
         let not_finite = set.set_tcb(1, &[tcb(0.0), tcb(f64::NAN), tcb(1.0)]);
         let expected = [
-            "track 1 has 3 keys but 1 values of velocity; give one for each key",
+            "track 1 has 3 keys but 1 value of velocity; give one for each key",
             "track 1, key 1: the tension, continuity or bias is not finite",
         ];
         assert_eq!(
