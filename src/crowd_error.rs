@@ -199,10 +199,16 @@ pub enum CrowdError {
         /// The reason.
         reason: Box<CrowdError>,
     },
-    /// A time is negative, NaN, or too large.
+    /// A time is NaN or too large.
     #[error("{seconds} s; times and steps of a crowd are finite, and within 2^52 ticks")]
     Seconds {
         /// The time in seconds.
+        seconds: f64,
+    },
+    /// A duration, or a time of the clock, is negative.
+    #[error("{seconds} s is negative; a crowd's clock starts at 0 and advances by steps of 0 s or more")]
+    NegativeSeconds {
+        /// The duration in seconds.
         seconds: f64,
     },
     /// The output is not exactly as long as the result.

@@ -65,7 +65,8 @@
 //!   [`mod@reference`].
 //!
 //! [`glam`], [`bytemuck`] and [`ash`] are re-exported in the versions that this crate uses. Functions that take [`glam::Quat`] also
-//! take `[f32; 4]`, `x y z w`.
+//! take `[f32; 4]`, `x y z w`; [`CrowdLibrary::set_inverse_bind`](crowd::CrowdLibrary::set_inverse_bind) also takes rows
+//! of matrices.
 //!
 //! # Guarantees
 //!
@@ -153,6 +154,7 @@ pub use crate::output::rotations::{Layout, Rotations, Samples, SamplesError, Vec
 pub use crate::output::scalars::Scalars;
 pub use crate::output::signs::{continue_signs, signs_differ, signs_jump};
 pub use crate::output::value::OutputValue;
+pub use crate::pose::affine::AffineMatrix;
 pub use crate::pose::local_to_model::ModelMatrices;
 pub use crate::pose::poses::WorldPoses;
 pub use crate::pose::skeleton::Skeleton;

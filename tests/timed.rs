@@ -157,7 +157,7 @@ fn times_and_offsets_that_do_not_fit_are_refused() {
         }
         for offset in [8, 48, u64::MAX] {
             let found = refused(offset, &[0.0, 1.0]);
-            let is_range = matches!(found, Error::Vulkan(VulkanError::BufferRange { .. }));
+            let is_range = matches!(found, Error::Vulkan(VulkanError::ResultOffset { .. }));
             assert!(is_range, "{offset}: {found}");
         }
     });

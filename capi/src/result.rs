@@ -105,7 +105,9 @@ impl From<VulkanError> for Failure {
 
 fn vulkan_code(error: &VulkanError) -> TumbleResult {
     match error {
-        VulkanError::BufferRange { .. } | VulkanError::BufferEnd { .. } => TumbleResult::WrongSize,
+        VulkanError::BufferRange { .. }
+        | VulkanError::BufferEnd { .. }
+        | VulkanError::ResultOffset { .. } => TumbleResult::WrongSize,
         VulkanError::NullHandle { .. } => TumbleResult::InvalidPointer,
         VulkanError::QueueFamily { .. }
         | VulkanError::SameQueue
@@ -161,6 +163,7 @@ impl From<CrowdError> for Failure {
             | CrowdError::Speed { .. }
             | CrowdError::Wrap { .. }
             | CrowdError::Seconds { .. }
+            | CrowdError::NegativeSeconds { .. }
             | CrowdError::EventTick { .. }
             | CrowdError::EventsSince { .. }
             | CrowdError::OtherDevice

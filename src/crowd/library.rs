@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 
 use bytemuck::Zeroable as _;
-use glam::{Affine3A, Vec3};
+use glam::Vec3;
 use rayon::prelude::*;
 
 use crate::crowd::clip_keys::KeyPrecision;
@@ -18,6 +18,7 @@ use crate::math::canonical::canonical;
 use crate::memory::reserved;
 use crate::method::interpolation::Interpolation;
 use crate::method::vector_method::VectorMethod;
+use crate::pose::affine::AffineMatrix;
 use crate::pose::skeleton::Skeleton;
 use crate::shader::{CHANNELS, CrowdDispatch, CrowdLink, ROOT};
 use crate::threads::stop;
@@ -434,19 +435,18 @@ impl CrowdLibrary {
         }
     }
 
-    /// Sets the inverse bind matrix of every joint: the inverse of the joint's model matrix in the bind pose.
+    /// Sets the inverse bind matrix of every joint: the inverse of the joint's model matrix in the bind pose, as
+    /// [`Affine3A`](glam::Affine3A) or as three rows of four numbers.
     ///
     /// # Errors
     /// When there is not one matrix for each joint, or a number is not finite.
-    pub fn set_inverse_bind(&mut self, matrices: &[Affine3A]) -> Result<(), CrowdError> {
+    pub fn set_inverse_bind<M: AffineMatrix>(&mut self, matrices: &[M]) -> Result<(), CrowdError> {
         self.check_joints("inverse bind matrices", matrices.len())?;
-        if let Some(joint) = matrices.iter().position(|matrix| !matrix.is_finite()) {
+        let is_finite = |matrix: &M| matrix.rows().as_flattened().iter().all(|x| x.is_finite());
+        if let Some(joint) = matrices.iter().position(|matrix| !is_finite(matrix)) {
             return Err(CrowdError::BindNotFinite { joint });
         }
-        let rows = |matrix: &Affine3A| {
-            let [x, y, z, moved] = matrix.to_cols_array_2d();
-            std::array::from_fn(|i| [x[i], y[i], z[i], moved[i]].map(canonical))
-        };
+        let rows = |matrix: &M| matrix.rows().map(|row| row.map(canonical));
         self.bind = matrices.iter().map(rows).collect();
         Ok(())
     }

@@ -190,9 +190,9 @@ impl ResultRange {
             .checked_add(self.bytes)
             .is_some_and(|end| end <= self.buffer.size);
         if !fits || !offset.is_multiple_of(each) {
-            return Err(VulkanError::BufferRange {
-                offset: self.buffer.offset.saturating_add(offset),
-                size: self.buffer.size.saturating_sub(offset),
+            return Err(VulkanError::ResultOffset {
+                offset,
+                size: self.buffer.size,
                 rotation: each,
                 needed: self.bytes,
             });

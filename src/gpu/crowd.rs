@@ -296,6 +296,13 @@ impl CrowdTarget {
         matches!(self.evaluation, Evaluation::Stages(_))
     }
 
+    /// The length in bytes of the results that the target's range has room for: of the instances that are visible, or of
+    /// more ([`Crowd::target`](crate::crowd::player::Crowd::target)).
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        self.range.size
+    }
+
     /// The output that is written to the buffer.
     #[must_use]
     pub fn output(&self) -> CrowdOutput {
@@ -303,7 +310,7 @@ impl CrowdTarget {
     }
 
     /// Bytes of the result of a frame.
-    fn bytes(&self, frame: &CrowdFrame<'_>) -> u64 {
+    fn frame_bytes(&self, frame: &CrowdFrame<'_>) -> u64 {
         u64::from(frame.instances) * self.crowd.bytes(self.output)
     }
 
@@ -405,7 +412,7 @@ impl CrowdReader {
         self.target.record(kernels.commands(), frame);
         let result = kernels.work.resource(self.target.range);
         kernels.work.recording.was_written(result);
-        let size = self.target.bytes(frame);
+        let size = self.target.frame_bytes(frame);
         self.results.submit(result, Some(size), None)
     }
 
@@ -421,6 +428,7 @@ impl std::fmt::Debug for CrowdTarget {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("CrowdTarget")
             .field("output", &self.output)
+            .field("bytes", &self.bytes())
             .finish_non_exhaustive()
     }
 }

@@ -189,6 +189,21 @@ pub enum VulkanError {
         /// The length of the result in bytes.
         needed: u64,
     },
+    /// A result does not fit a target's range at the offset at which it is recorded.
+    #[error(
+        "the result of {needed} bytes does not fit at `offset` {offset} of the target's range, which has {size} bytes; `offset` is at most {}, and a multiple of {rotation}",
+        size.saturating_sub(*needed) / rotation * rotation
+    )]
+    ResultOffset {
+        /// The offset in bytes from the start of the target's range.
+        offset: u64,
+        /// The length of the target's range in bytes.
+        size: u64,
+        /// The size of a value of the result in bytes; the offset must be a multiple of it.
+        rotation: u64,
+        /// The length of the result in bytes.
+        needed: u64,
+    },
     /// The device cannot export the memory of results.
     #[error(
         "{device} cannot share the memory of results with other APIs: {lacks}; evaluate into the host's memory instead"

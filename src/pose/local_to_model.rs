@@ -11,13 +11,11 @@ use crate::memory::zeroed;
 use crate::output::encoding::MatrixOrder;
 use crate::output::pose_error::{PoseError, check_skeleton};
 use crate::output::rotations::Layout;
+use crate::pose::affine::{AffineMatrix as _, AffineRows};
 use crate::pose::skeleton::Skeleton;
 use crate::pose::transforms::Transforms;
 use crate::shader::{Link, ROOT};
 use crate::twin::matrix;
-
-/// The three rows of an affine matrix for column vectors.
-type AffineRows = [[f32; 4]; 3];
 
 impl Engine {
     /// Computes model matrices along a skeleton: `M = M_parent T R S` for every joint, from its translation, rotation
@@ -75,7 +73,7 @@ impl Engine {
         let mut matrices: Vec<AffineRows> = zeroed(count, "model matrices")?;
         let links = skeleton.links();
         let bind: Option<Vec<AffineRows>> =
-            inverse_bind.map(|all| all.iter().map(|&matrix| rows(matrix)).collect());
+            inverse_bind.map(|all| all.iter().map(|matrix| matrix.rows()).collect());
         let walk_all = || {
             let frames = matrices.par_chunks_mut(tracks.max(1)).enumerate();
             frames.for_each(|(sample, model)| {
@@ -156,11 +154,6 @@ fn product(a: &AffineRows, b: &AffineRows) -> AffineRows {
         row[3] += moved;
         row
     })
-}
-
-fn rows(matrix: Affine3A) -> AffineRows {
-    let [x, y, z, moved] = matrix.to_cols_array_2d();
-    std::array::from_fn(|i| [x[i], y[i], z[i], moved[i]])
 }
 
 /// The matrix of every joint at every sample, `[sample][track]`: three rows of four numbers, for column vectors. The

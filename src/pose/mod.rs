@@ -1,6 +1,7 @@
 //! Poses: blending and adding layers of rotations, skeletons with rotations and positions in the
 //! world, transforms of rotations, translations and scales, and scalars.
 
+pub(crate) mod affine;
 pub(crate) mod follow;
 pub(crate) mod local_to_model;
 #[cfg(feature = "vulkan")]

@@ -218,7 +218,7 @@ fn assert_visible_instances_are_recorded(mapping: Mapping) {
                 }
             }
             for (row, &instance) in found.chunks_exact(each).zip(&list) {
-                let of_all = &bytes[instance as usize * each..][..each];
+                let of_all = &bytes[instance * each..][..each];
                 assert!(row == of_all, "{output:?}, frame {frame}, {instance}");
             }
         }

@@ -15,7 +15,7 @@
 //! ) -> Result<(), Box<dyn std::error::Error>> {
 //!     let engine = unsafe { Engine::from_vulkan(tumble_wgpu::handles(device)?, &EngineOptions::default())? };
 //!     let mut crowd = engine.crowd(library, 1000, 1)?;
-//!     let bytes = 16 * crowd.output_len(CrowdValues::Model) as u64;
+//!     let bytes = crowd.output_bytes(CrowdValues::Model);
 //!     let matrices = tumble_wgpu::buffer(device, queue, bytes, wgpu::BufferUsages::STORAGE);
 //!     let target = unsafe { crowd.target(CrowdValues::Model, tumble_wgpu::range(&matrices)?)? };
 //!

@@ -3,7 +3,6 @@
 use std::ffi::{CString, c_char};
 use std::sync::{OnceLock, RwLock, RwLockReadGuard, RwLockWriteGuard};
 
-use glam::{Affine3A, Mat3A, Vec3A};
 use tumble::VectorMethod;
 use tumble::crowd::{CrowdLibrary, CrowdStorage};
 use tumble_formats::motion::{Joint, Transform};
@@ -266,15 +265,7 @@ pub unsafe extern "C" fn tumble_crowd_library_set_inverse_bind(
         let rows = unsafe { list(matrices, numbers, "matrices")? };
         let (rows, _) = rows.as_chunks::<4>();
         let (matrices, _) = rows.as_chunks::<3>();
-        let matrix = |rows: &[[f32; 4]; 3]| {
-            let column = |i: usize| Vec3A::from_array(rows.map(|row| row[i]));
-            Affine3A {
-                matrix3: Mat3A::from_cols(column(0), column(1), column(2)),
-                translation: column(3),
-            }
-        };
-        let matrices: Vec<Affine3A> = matrices.iter().map(matrix).collect();
-        Ok(library.write()?.set_inverse_bind(&matrices)?)
+        Ok(library.write()?.set_inverse_bind(matrices)?)
     })
 }
 

@@ -22,7 +22,7 @@ use crate::result::{TumbleResult, code};
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn tumble_crowd_set_visible(
     crowd: *mut TumbleCrowd,
-    instances: *const u32,
+    instances: *const usize,
     count: usize,
 ) -> TumbleResult {
     code(|| {

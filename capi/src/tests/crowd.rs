@@ -521,7 +521,7 @@ fn fades_and_lists_are_those_of_the_engine() {
         } = of_engine;
         assert!(is_there && found == (start, ticks, from, to));
         let output = CrowdOutput::from(CrowdValues::Model);
-        for list in [&[30u32, 2, 5][..], &[5], &[]] {
+        for list in [&[30usize, 2, 5][..], &[5], &[]] {
             // SAFETY: as many numbers as stated, and room for one.
             unsafe {
                 done(tumble_crowd_set_visible(crowd, list.as_ptr(), list.len()));

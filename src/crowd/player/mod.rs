@@ -234,6 +234,14 @@ impl Crowd {
         self.visible_count() * self.library.joint_count() * output.into().vector_count()
     }
 
+    /// The length of a result for the [visible](Crowd::set_visible) instances in bytes: the size of a buffer for
+    /// [`Crowd::target`](crate::crowd::player::Crowd). A rotation has 16 bytes and a matrix 48; in 16 bits, half as many.
+    #[must_use]
+    pub fn output_bytes(&self, output: impl Into<CrowdOutput>) -> u64 {
+        let output = output.into();
+        (self.visible_count() * self.library.joint_count() * output.bytes()) as u64
+    }
+
     /// Evaluates all [visible](Crowd::set_visible) instances at the clock's time, and waits for the result.
     ///
     /// The result is `[instance][joint]`: a rotation, or the three rows of a matrix.
@@ -463,13 +471,21 @@ impl Crowd {
     /// # Errors
     /// When `seconds` is negative or NaN, and as [`Crowd::set_clock`].
     pub fn advance(&mut self, seconds: f64) -> Result<(), CrowdError> {
-        match u64::try_from(self.ticks_of(seconds)?) {
-            Ok(ticks) => self.advance_ticks(ticks),
-            Err(_) => Err(CrowdError::Seconds { seconds }),
-        }
+        self.advance_ticks(self.clock_ticks(seconds)?)
     }
 
-    /// Rounds a time in seconds to ticks, for [`CrowdLayer::time`](crate::crowd::layer::CrowdLayer::time).
+    /// Rounds a duration in seconds, or a time of the clock, to ticks: for [`Crowd::fade`], for
+    /// [`CrowdFade`](crate::crowd::fade::CrowdFade) and for [`Crowd::set_clock`].
+    ///
+    /// # Errors
+    /// When `seconds` is negative or NaN, or 2^52 ticks or more.
+    pub fn clock_ticks(&self, seconds: f64) -> Result<u64, CrowdError> {
+        let ticks = self.ticks_of(seconds)?;
+        u64::try_from(ticks).map_err(|_| CrowdError::NegativeSeconds { seconds })
+    }
+
+    /// Rounds a time in seconds to ticks, for [`CrowdLayer::time`](crate::crowd::layer::CrowdLayer::time), which may be
+    /// negative: before the clip's first key.
     ///
     /// # Errors
     /// When `seconds` is NaN, or 2^52 ticks or more in magnitude.

@@ -31,17 +31,16 @@ impl Crowd {
     ///
     /// # Errors
     /// When an instance does not exist or is in the list twice, or there is not enough memory; then nothing changes.
-    pub fn set_visible(&mut self, instances: &[u32]) -> Result<(), CrowdError> {
+    pub fn set_visible(&mut self, instances: &[usize]) -> Result<(), CrowdError> {
         let count = self.instance_count();
-        if self.instances.visible.as_deref() == Some(instances) {
+        if (self.visible()).is_some_and(|visible| visible.eq(instances.iter().copied())) {
             return Ok(());
         }
         if self.seen.is_empty() {
             self.seen = zeroed(count.div_ceil(64), "a crowd's list of instances")?;
         }
         self.seen.fill(0);
-        for (position, &instance) in instances.iter().enumerate() {
-            let index = instance as usize;
+        for (position, &index) in instances.iter().enumerate() {
             if index >= count {
                 return Err(CrowdError::Missing {
                     subject: "instance",
@@ -63,7 +62,8 @@ impl Crowd {
             None => reserved(count, "a crowd's list of instances")?,
         };
         list.clear();
-        list.extend_from_slice(instances);
+        // A crowd has fewer than 2^32 instances.
+        list.extend(instances.iter().map(|&index| index as u32));
         self.instances.set_visible(Some(list));
         Ok(())
     }
@@ -75,8 +75,9 @@ impl Crowd {
 
     /// The visible instances, in the order of results; `None`: all of them.
     #[must_use]
-    pub fn visible(&self) -> Option<&[u32]> {
-        self.instances.visible.as_deref()
+    pub fn visible(&self) -> Option<impl ExactSizeIterator<Item = usize>> {
+        let visible = self.instances.visible.as_ref()?.iter();
+        Some(visible.map(|&index| index as usize))
     }
 
     /// Number of visible instances.

@@ -27,7 +27,7 @@ impl Crowd {
     }
 
     /// Fades the weight of a layer above the first from its current value to `weight`, linearly within `ticks` of the
-    /// clock; with 0 ticks it changes at once.
+    /// clock ([`Crowd::clock_ticks`]); with 0 ticks it changes at once.
     ///
     /// Afterwards the weight stays. [`Crowd::set`], [`Crowd::set_weight`] and another fade of the layer end the fade.
     ///
@@ -43,7 +43,7 @@ impl Crowd {
     /// }
     /// let mut crowd = Engine::new(Device::Cpu)?.crowd(&library, 100, 2)?;
     /// crowd.set(7, 1, CrowdLayer::new(1).with_weight(0.0))?;
-    /// let half_a_second = crowd.ticks_of(0.5)? as u64;
+    /// let half_a_second = crowd.clock_ticks(0.5)?;
     /// crowd.fade(7, 1, 1.0, half_a_second)?;
     /// crowd.advance(0.25)?;
     /// assert_eq!(crowd.get(7, 1)?.weight, 0.5);
