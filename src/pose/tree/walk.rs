@@ -240,11 +240,6 @@ fn unit<D: Doubles>(q: [D; 4]) -> [D; 4] {
 
 /// A product of unit quaternions, normalised by a step of Newton's: rounding does not add up along the tree.
 #[inline(always)]
-fn unit_product<D: Doubles>(a: [D; 4], b: [D; 4]) -> [D; 4] {
-    renewed(product(a, b))
-}
-
-#[inline(always)]
 fn renewed<D: Doubles>(q: [D; 4]) -> [D; 4] {
     let scale = D::all(1.5) - D::all(0.5) * dot(q, q);
     let [x, y, z, w] = q;
@@ -383,11 +378,11 @@ impl<D: Doubles> Walked<D> {
         }
         if let Some([x, y, z, w]) = frame.rest {
             let rest = [D::all(x), D::all(y), D::all(z), D::all(w)];
-            let rotation = unit_product(self.rotation, rest);
+            let rotation = product(self.rotation, rest);
             match frame.motion {
                 // The joint rotates it further.
                 WalkMotion::Hinge(_) | WalkMotion::Ball(_) => self.rotation = rotation,
-                _ => self.rotate(rotation),
+                _ => self.rotate(renewed(rotation)),
             }
         }
         match &frame.motion {
@@ -419,7 +414,7 @@ impl<D: Doubles> Walked<D> {
             }
             WalkMotion::Ball(ball) => {
                 let first = joints.balls + ball * BALL;
-                self.rotate(unit_product(self.rotation, joints.rotation(first)));
+                self.rotate(renewed(product(self.rotation, joints.rotation(first))));
                 if moves {
                     let rate = along(&self.axes, joints.vector(first + 4));
                     self.angular = sum(self.angular, rate);
@@ -434,7 +429,8 @@ impl<D: Doubles> Walked<D> {
                     let rate = along(&self.axes, joints.vector(first + 10));
                     self.angular = sum(self.angular, rate);
                 }
-                self.rotate(unit_product(self.rotation, joints.rotation(first + 3)));
+                let rotation = joints.rotation(first + 3);
+                self.rotate(renewed(product(self.rotation, rotation)));
             }
         }
     }
