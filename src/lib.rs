@@ -206,12 +206,12 @@ pub mod trees {
     //!
     //! A [`Tree`] is made of [`TreeBody`]s, or read from MJCF or URDF by the crate `tumble-formats`.
     //! [`Tree::poses`] and [`Tree::motions`] compute all bodies for a [`Configuration`] of the joints in f64, with the
-    //! same bits on every processor.
+    //! same bits on every processor; [`Tree::walk`] those of many configurations.
 
     pub use crate::pose::tree::{
-        BodyMotion, BodyOrder, BodyPose, BodyVelocity, Configuration, ConfigurationRates,
-        FrameWords, JointCounts, JointKind, JointTracks, Mimic, Siblings, Tree, TreeBody,
-        TreeError, TreeFrames, TreeJoint,
+        BodyArrays, BodyMotion, BodyOrder, BodyPose, BodyRows, BodyVelocity, Configuration,
+        ConfigurationRates, FrameWords, JointCounts, JointKind, JointTracks, Mimic, Siblings, Tree,
+        TreeBody, TreeError, TreeFrames, TreeJoint, TreeWalk, WalkMemory,
     };
 }
 

@@ -864,6 +864,31 @@ fn mirrored_animations_keep_weights_and_names() {
     line(folder, "convert d.gltf --mirror x -o e.gltf");
     let [alone, mirrored] = ["d.gltf", "e.gltf"].map(read);
     assert_eq!(mirrored["animations"], alone["animations"]);
+    // Weights are cut as joints are.
+    line(
+        folder,
+        "convert a.gltf --mirror x --start 0.5 --end 0.75 -o cut.gltf",
+    );
+    let cut = read("cut.gltf");
+    for index in [0, 1] {
+        for channel in cut["animations"][index]["channels"].as_array().unwrap() {
+            let sampler = channel["sampler"].as_u64().unwrap() as usize;
+            let input = &cut["animations"][index]["samplers"][sampler]["input"];
+            let times = &cut["accessors"][input.as_u64().unwrap() as usize];
+            let [first, last] = ["min", "max"].map(|end| times[end][0].as_f64().unwrap());
+            assert_eq!(last - first, 0.25, "{channel}");
+        }
+    }
+    // A joint at rest gets the motion of its partner, which then rests.
+    let right = ",\n        {\"sampler\": 2, \"target\": {\"node\": 2, \"path\": \"rotation\"}}";
+    fs::write(folder.join("one.gltf"), file.replace(right, "")).unwrap();
+    line(folder, "convert one.gltf --mirror x -o other.gltf");
+    let channels = &read("other.gltf")["animations"][0]["channels"];
+    let nodes = channels.as_array().unwrap().iter();
+    let nodes: Vec<u64> = nodes
+        .map(|it| it["target"]["node"].as_u64().unwrap())
+        .collect();
+    assert_eq!(nodes, [3, 2]);
 }
 
 /// The mirror image of a walk is another walk, and the image of this is the first again.

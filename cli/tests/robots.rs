@@ -163,6 +163,8 @@ fn files_of_protomotions_are_archives_of_torch() {
     fs::rename(folder.join("take.csv"), folder.join("takes/take.csv")).unwrap();
     let eval = "eval takes -o out --robot robot.xml --dialect protomotions --fps 30 -m slerp";
     line(folder, eval);
+    let library = eval.replace("takes -o out", "takes/take.csv -o take.pt");
+    refused(folder, &library, "end the output in .motion");
     let path = folder.join("out/take.motion");
     let mut archive = zip::ZipArchive::new(fs::File::open(&path).unwrap()).unwrap();
     let mut members = Vec::new();

@@ -168,6 +168,9 @@ pub struct ReadOptions {
     /// The tracks that will be selected from the clips; `None`: all. Readers need not read the keys of the other tracks,
     /// which then rest; numbers of theirs that are not finite are no errors.
     pub tracks: Option<TrackSelection>,
+    /// Whether joints at rest are read too if their partners on the other side move, for mirroring. Files with all of
+    /// their joints in each clip have them anyway.
+    pub with_partners: bool,
 }
 
 /// The unit of times that are whole numbers.
@@ -414,20 +417,30 @@ pub trait Document: fmt::Debug + Send + Sync {
     }
 
     /// Writes the file with the keys of these clips instead of those of the joints in the animations that the clips were
-    /// read from, by their indices. Everything else stays: the names of animations, morph weights, and other animations.
-    /// Returns warnings.
+    /// read from, by their indices. Everything else stays: the names of animations, morph weights of clips that were not
+    /// cut, and other animations. Returns warnings.
     ///
     /// # Errors
     /// As [`Document::write_instead`].
     fn write_joints(
         &self,
-        clips: &[&Motion],
+        clips: &[JointClip<'_>],
         options: &MotionOptions,
         path: &Path,
         out: &mut dyn Write,
     ) -> Result<Vec<Diagnostic>, WriteError> {
-        self.write_instead(clips, options, path, out)
+        let joints: Vec<&Motion> = clips.iter().map(|clip| clip.joints).collect();
+        self.write_instead(&joints, options, path, out)
     }
+}
+
+/// A clip whose joints have other keys than its document.
+#[derive(Debug, Clone, Copy)]
+pub struct JointClip<'a> {
+    /// The new keys of the joints.
+    pub joints: &'a Motion,
+    /// The clip, or a part of it, with the keys of morph weights.
+    pub weights: &'a Motion,
 }
 
 /// Writes sampled clips; returns warnings about data that is changed.

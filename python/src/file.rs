@@ -496,6 +496,7 @@ impl FileOptions {
             keyframes,
             has_body_model: body_model.is_some(),
             tracks: None,
+            with_partners: false,
         };
         let format = format.as_deref().map(format_named).transpose()?;
         let up: Option<UpAxis> = up.map(|axis| option_of(&axis, "up")).transpose()?;

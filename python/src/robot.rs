@@ -9,7 +9,8 @@ use pyo3::types::{PyDict, PyString, PyType};
 use tumble::method::BESSEL_OVERHAUSER;
 use tumble::names::counted;
 use tumble::trees::{
-    BodyMotion, BodyPose, BodyVelocity, Configuration, ConfigurationRates, JointKind, Tree,
+    BodyArrays, BodyMotion, BodyPose, BodyVelocity, Configuration, ConfigurationRates, JointKind,
+    Tree,
 };
 use tumble::{Quantity, TrackSet};
 use tumble_formats::motion::Motion;
@@ -210,17 +211,27 @@ impl Robot {
         let count: usize = shape.iter().product();
         let robot = slf.clone().unbind();
         let width = bodies.len();
-        let motions = work(py, count.saturating_mul(width), move || {
+        let [three, four] = [3, 4].map(|each| count.saturating_mul(width).saturating_mul(each));
+        let rates = if moves { three } else { 0 };
+        let [mut positions, mut rotations] = [three, four].map(|length| vec![0.0; length]);
+        let [mut velocities, mut angular_velocities] = [rates; 2].map(|length| vec![0.0; length]);
+        let arrays = work(py, count.saturating_mul(width), move || {
             let tree = &robot.get().robot.tree;
             let at = |sample, state: &mut _| arrays.set(sample, state);
-            robot::motions(tree, count, &bodies, &centres, at)
-                .map_err(|error| input(error.to_string()))
+            let rows = BodyArrays {
+                positions: positions.as_chunks_mut().0,
+                rotations: rotations.as_chunks_mut().0,
+                velocities: velocities.as_chunks_mut().0,
+                angular_velocities: angular_velocities.as_chunks_mut().0,
+                is_w_first: quaternions == Order::Wxyz,
+            };
+            robot::body_arrays(tree, count, &bodies, &centres, at, rows)
+                .map_err(|error| input(error.to_string()))?;
+            Ok([positions, rotations, velocities, angular_velocities])
         })?;
         let result = PyDict::new(py);
         let shape = [&shape[..], &[width]].concat();
-        set_bodies(&result, &motions, &shape, quaternions, moves, |number| {
-            number
-        })?;
+        set_arrays(&result, arrays, &shape, moves)?;
         Ok(result)
     }
 
@@ -420,41 +431,34 @@ fn vectors_of(of: &Option<JointArray>, sample: usize) -> impl Iterator<Item = DV
 }
 
 /// Some numbers of each body, in one list.
-fn numbers_of<T, const N: usize>(
+fn numbers_of<const N: usize>(
     motions: &[BodyMotion],
     of: impl Fn(&BodyMotion) -> [f64; N],
-    number: impl Fn(f64) -> T,
-) -> Vec<T> {
+) -> Vec<f32> {
     let mut numbers = Vec::with_capacity(N * motions.len());
     for motion in motions {
-        numbers.extend(of(motion).map(&number));
+        numbers.extend(of(motion).map(|number| number as f32));
     }
     numbers
 }
 
-/// Sets the arrays of bodies in a result.
-fn set_bodies<T: Element>(
+/// Sets the arrays of bodies in a result: positions, rotations and, with velocities, both of these.
+fn set_arrays<T: Element>(
     result: &Bound<'_, PyDict>,
-    motions: &[BodyMotion],
+    arrays: [Vec<T>; 4],
     shape: &[usize],
-    order: Order,
     moves: bool,
-    number: impl Fn(f64) -> T,
 ) -> PyResult<()> {
-    let py = result.py();
-    let set = |name: &str, width: usize, numbers: Vec<T>| {
+    let names = [
+        ("body_pos_w", 3),
+        ("body_quat_w", 4),
+        ("body_lin_vel_w", 3),
+        ("body_ang_vel_w", 3),
+    ];
+    let count = if moves { 4 } else { 2 };
+    for ((name, width), numbers) in names.into_iter().zip(arrays).take(count) {
         let shape = [shape, &[width]].concat();
-        result.set_item(name, shaped(py, numbers, &shape)?)
-    };
-    let positions = |motion: &BodyMotion| motion.pose.position.to_array();
-    let rotations = |motion: &BodyMotion| order.of_xyzw(motion.pose.rotation.to_array());
-    set("body_pos_w", 3, numbers_of(motions, positions, &number))?;
-    set("body_quat_w", 4, numbers_of(motions, rotations, &number))?;
-    if moves {
-        let linear = |motion: &BodyMotion| motion.velocity.linear.to_array();
-        let angular = |motion: &BodyMotion| motion.velocity.angular.to_array();
-        set("body_lin_vel_w", 3, numbers_of(motions, linear, &number))?;
-        set("body_ang_vel_w", 3, numbers_of(motions, angular, &number))?;
+        result.set_item(name, shaped(result.py(), numbers, &shape)?)?;
     }
     Ok(())
 }
@@ -553,9 +557,14 @@ pub(crate) fn bodies<'py>(
         shaped(py, found.joint_rates, &[samples, joints])?,
     )?;
     let shape = [samples, found.order.len()];
-    set_bodies(&result, &found.motions, &shape, order, true, |number| {
-        number as f32
-    })?;
+    let of = &found.motions;
+    let arrays = [
+        numbers_of(of, |motion| motion.pose.position.to_array()),
+        numbers_of(of, |motion| order.of_xyzw(motion.pose.rotation.to_array())),
+        numbers_of(of, |motion| motion.velocity.linear.to_array()),
+        numbers_of(of, |motion| motion.velocity.angular.to_array()),
+    ];
+    set_arrays(&result, arrays, &shape, true)?;
     Ok(result)
 }
 

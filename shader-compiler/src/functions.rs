@@ -93,7 +93,7 @@ const BY_HAND: [(&str, &str); 4] = [
 
 /// The functions that are written for vectors although they compare numbers: loops over whole vectors call them. Others
 /// stay functions of f32, whose `if` evaluates one side only.
-const CHOOSING: [&str; 1] = ["small_angle_cubic"];
+const CHOOSING: [&str; 2] = ["small_angle_cubic", "rotation_about"];
 
 /// Why a function cannot be written in a form.
 pub(crate) type Result<T> = std::result::Result<T, String>;
@@ -1114,6 +1114,10 @@ impl<'a> Writer<'a> {
             let (left, right) = (self.value(left, None)?, self.value(right, None)?);
             return binary(op, false, left, right);
         }
+        if let Some((number, mask)) = self.has_bits(handle) {
+            let number = self.value(number, None)?.within(ATOM);
+            return Ok(atom(format!("{number}.has_bits({mask})")));
+        }
         let (method, sign) = match op {
             BinaryOperator::LessEqual => ("at_most", ""),
             BinaryOperator::Equal => ("equals", ""),
@@ -1182,6 +1186,18 @@ impl<'a> Writer<'a> {
         };
         match self.literal_in_all(shift)? {
             Literal::U32(shift) => Some((self.bits_of(shifted)?, seed, shift)),
+            _ => None,
+        }
+    }
+
+    /// `(bitcast<u32>(x) & MASK) == MASK`: the number and the mask, which is not 0.
+    fn has_bits(&self, handle: Handle<Expression>) -> Option<(Handle<Expression>, u32)> {
+        let (masked, all) = self.operands(handle, BinaryOperator::Equal)?;
+        let (bits, mask) = self.operands(masked, BinaryOperator::And)?;
+        match [mask, all].map(|handle| self.literal_in_all(handle)) {
+            [Some(Literal::U32(mask)), Some(Literal::U32(all))] if mask == all && mask != 0 => {
+                Some((self.bits_of(bits)?, mask))
+            }
             _ => None,
         }
     }

@@ -134,6 +134,15 @@ fn functions_are_written_for_as_many_numbers_as_their_operations_allow() {
              [N::choose(number_1, b[0], a[0] + b[0]), N::choose(number_1, b[1], a[1] + b[1]), \
              N::choose(number_1, b[2], a[2] + b[2])]\n}",
         ),
+        (
+            "rotation_about",
+            "fn rotation_about(a: f32, b: f32) -> f32 {
+                 let bits = bitcast<u32>(a + b);
+                 return select(a, -b, (bits & 2u) == 2u);
+             }",
+            "fn rotation_about<N: Choice>(a: N, b: N, ) -> N {\n\
+             N::choose((a + b).has_bits(2), -b, a)\n}",
+        ),
     ] {
         let text = function(name, source);
         assert!(text.contains(expected), "{text}");

@@ -978,16 +978,15 @@ pub(crate) fn small_angle_cubic<N: Choice>(
 
 /// The rotation by an angle, up to 8192 rad in magnitude, about a unit axis.
 #[inline(always)]
-pub(crate) fn rotation_about(axis: [f32; 3], angle: f32) -> [f32; 4] {
-    let half = angle * 0.5;
-    let shifted = half * QUARTERS_PER_RADIAN + WHOLE_SHIFT;
-    let quarters = shifted.to_bits();
-    let whole = shifted - WHOLE_SHIFT;
-    let rest = half - whole * QUARTER_1 - whole * QUARTER_2 - whole * QUARTER_3;
+pub(crate) fn rotation_about<N: Choice>(axis: [N; 3], angle: N) -> [N; 4] {
+    let half = angle * N::all(0.5);
+    let shifted = half * N::all(QUARTERS_PER_RADIAN) + N::all(WHOLE_SHIFT);
+    let whole = shifted - N::all(WHOLE_SHIFT);
+    let rest =
+        half - whole * N::all(QUARTER_1) - whole * N::all(QUARTER_2) - whole * N::all(QUARTER_3);
     let sines = sine_cosine(rest);
-    let is_odd = quarters & 1 == 1;
-    let sign = if quarters & 2 == 2 { -1.0 } else { 1.0 };
-    let sine = (if is_odd { sines.1 } else { sines.0 }) * sign;
-    let cosine = (if is_odd { -sines.0 } else { sines.1 }) * sign;
+    let sign = N::choose(shifted.has_bits(2), N::all(-1.0), N::all(1.0));
+    let sine = N::choose(shifted.has_bits(1), sines.1, sines.0) * sign;
+    let cosine = N::choose(shifted.has_bits(1), -sines.0, sines.1) * sign;
     [axis[0] * sine, axis[1] * sine, axis[2] * sine, cosine]
 }

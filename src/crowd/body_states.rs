@@ -1,20 +1,19 @@
 //! States of a robot's clips at any times: the values of its joints, and its bodies with their velocities. The joints are
 //! interpolated as states of motion tables are, and a walk along the tree computes the bodies from them in f32.
 
-use std::ops::Range;
-
 use rayon::prelude::*;
 
 use crate::crowd::states::{
-    FrameStep, Joint, MotionTables, PoseScratch, PoseValues, Poses, StateRows, TASK, check_clips,
-    check_steps,
+    FrameStep, JOINT_NUMBERS, MotionTables, PoseScratch, PoseValues, Poses, StateRows, TASK,
+    check_clips, check_steps,
 };
-use crate::crowd::tree_walk::{WalkedFrame, scalar, walk};
+use crate::crowd::tree_walk::{FRAME_NUMBERS, frame, scalar, walk};
 use crate::crowd_error::CrowdError;
 use crate::engine::Engine;
 use crate::pose::tree::frames::TreeFrames;
+use crate::shader::TreeFrame;
 use crate::simd::dispatch::{InLanes, in_lanes_of};
-use crate::simd::lanes::Lanes;
+use crate::simd::lanes::{Lanes, MAX_LANES};
 use crate::threads::stop;
 
 /// The clips of a robot: [`MotionTables`] whose joints are tracks without parents, and the [`TreeFrames`] that follow them.
@@ -207,17 +206,46 @@ impl BodyStates<'_> {
 struct BodyScratch {
     pose: PoseScratch,
     rotations: Vec<[f32; 4]>,
-    rows: StateRows,
-    sample: SampleScratch,
+    here: SampleScratch,
     /// Those at both ends of a step.
     ends: [SampleScratch; 2],
 }
 
-/// The states of a sample.
+/// The states of as many instances as a vector has lanes.
 #[derive(Default)]
 struct SampleScratch {
-    tracks: Vec<Joint<f32>>,
-    frames: Vec<WalkedFrame>,
+    rows: StateRows,
+    /// The numbers of all tracks and of all frames, each as a vector.
+    tracks: Vec<f32>,
+    frames: Vec<f32>,
+    /// One body.
+    body: StateRows,
+}
+
+impl SampleScratch {
+    fn resize<L: Lanes>(&mut self, tracks: usize, frames: usize) {
+        self.rows.resize(tracks * L::COUNT);
+        self.tracks.resize(tracks * JOINT_NUMBERS * L::COUNT, 0.0);
+        self.frames.resize(frames * FRAME_NUMBERS * L::COUNT, 0.0);
+        self.body.resize(L::COUNT);
+    }
+
+    /// Computes the frames from the rows; without `frames` only the tracks.
+    #[inline(always)]
+    fn walk<L: Lanes>(&mut self, frames: &[TreeFrame], moves: bool) {
+        let each = JOINT_NUMBERS * L::COUNT;
+        for (track, numbers) in self.tracks.chunks_exact_mut(each).enumerate() {
+            self.rows.joint::<L>(track, moves).store(numbers);
+        }
+        walk::<L>(frames, &self.tracks, moves, &mut self.frames);
+    }
+
+    /// Sets the body to a frame.
+    #[inline(always)]
+    fn find<L: Lanes>(&mut self, index: u32, moves: bool) {
+        let state = frame::<L>(&self.frames, index);
+        self.body.put::<L>(0, &state, moves);
+    }
 }
 
 /// Some instances.
@@ -233,18 +261,7 @@ struct BodyTask<'a, 'b> {
 impl InLanes for BodyTask<'_, '_> {
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
-        let BodyScratch {
-            pose,
-            rotations,
-            rows,
-            sample,
-            ends,
-        } = &mut *self.memory;
-        let states = &mut self.states;
-        let joints = self.poses.tables.joint_count();
-        rotations.resize(joints, [0.0; 4]);
-        pose.resize::<L>(joints);
-        rows.resize(joints * L::COUNT);
+        let states = &self.states;
         let has_velocities =
             !(states.velocities.is_empty() && states.angular_velocities.is_empty());
         let has_bodies =
@@ -255,77 +272,172 @@ impl InLanes for BodyTask<'_, '_> {
             true => PoseValues::Velocities,
             false => PoseValues::World,
         };
-        let TreeFrames {
-            frames,
-            bodies,
-            points,
-            scalars,
-            is_w_first,
-        } = self.frames;
-        for (instance, &(clip, tick)) in self.at.iter().enumerate() {
-            let mut compute = |tick, values, sample: &mut SampleScratch| {
-                let SampleScratch {
-                    tracks,
-                    frames: walked,
-                } = sample;
-                let row = (&mut *rows, 0);
+        let steps = self.steps.filter(|_| has_rates);
+        let frames = match has_bodies {
+            true => &self.frames.frames[..],
+            false => &[],
+        };
+        let joints = self.poses.tables.joint_count();
+        let BodyScratch {
+            pose,
+            rotations,
+            here,
+            ends,
+        } = &mut *self.memory;
+        rotations.resize(joints, [0.0; 4]);
+        pose.resize::<L>(joints);
+        for sample in [&mut *here].into_iter().chain(&mut *ends) {
+            sample.resize::<L>(joints, self.frames.frames.len());
+        }
+        for (group, instances) in self.at.chunks(L::COUNT).enumerate() {
+            let first = group * L::COUNT;
+            let steps = steps.map(|steps| &steps[first..][..instances.len()]);
+            for (lane, &(clip, tick)) in instances.iter().enumerate() {
+                let row = (&mut here.rows, lane);
                 (self.poses).compute::<L>((clip, tick), values, pose, rotations, row);
-                let is_moving = values == PoseValues::Velocities;
-                let states = (0..joints).map(|joint| rows.state(joint * L::COUNT, is_moving));
-                tracks.clear();
-                tracks.extend(states);
-                if has_bodies {
-                    walk(frames, tracks, moves, walked);
-                }
-            };
-            compute(tick, values, sample);
-            if let (Some(steps), true) = (self.steps, has_rates) {
-                let step = steps[instance];
-                for (end, tick) in ends.iter_mut().zip(step.ticks) {
-                    compute(tick, PoseValues::World, end);
-                }
-                let [before, after] = &*ends;
-                let pairs = before.tracks.iter().zip(&after.tracks);
-                for (track, (before, after)) in sample.tracks.iter_mut().zip(pairs) {
-                    track.differ(before, after, step.per_second);
-                }
-                let pairs = before.frames.iter().zip(&after.frames);
-                for (frame, (before, after)) in sample.frames.iter_mut().zip(pairs) {
-                    let (before, after) = (&before.in_world, &after.in_world);
-                    frame.in_world.differ(before, after, step.per_second);
+                for step in steps.iter().flat_map(|steps| steps.get(lane)) {
+                    for (end, tick) in ends.iter_mut().zip(step.ticks) {
+                        let row = (&mut end.rows, lane);
+                        let values = PoseValues::World;
+                        (self.poses).compute::<L>((clip, tick), values, pose, rotations, row);
+                    }
                 }
             }
-            let of_scalars = instance * scalars.len()..(instance + 1) * scalars.len();
-            let of_bodies = instance * bodies.len()..(instance + 1) * bodies.len();
-            let tracks = &sample.tracks;
-            for (array, part) in [
-                (&mut *states.joint_values, 0),
-                (&mut *states.joint_rates, 1),
-            ] {
-                let output = array.get_mut(of_scalars.clone()).unwrap_or_default();
-                for (value, &word) in output.iter_mut().zip(scalars) {
-                    *value = scalar(tracks, word)[part];
+            here.walk::<L>(frames, moves);
+            if steps.is_some() {
+                for end in &mut *ends {
+                    end.walk::<L>(frames, false);
                 }
             }
-            let put = |to: &mut [[f32; 3]], list: &[u32], of: fn(&Joint<f32>) -> [f32; 3]| {
-                let output = to.get_mut(of_bodies.clone()).unwrap_or_default();
-                for (value, &frame) in output.iter_mut().zip(list) {
-                    *value = of(&sample.frames[frame as usize].in_world);
-                }
+            let group = Group {
+                first,
+                count: instances.len(),
+                steps,
+                moves,
             };
-            put(states.positions, bodies, |body| body.position);
-            put(states.velocities, points, |body| body.velocity);
-            put(states.angular_velocities, bodies, |body| {
-                body.angular_velocity
-            });
-            let output = states.rotations.get_mut(Range::clone(&of_bodies));
-            for (value, &frame) in output.unwrap_or_default().iter_mut().zip(bodies) {
-                let [x, y, z, w] = sample.frames[frame as usize].in_world.rotation;
-                *value = match is_w_first {
-                    true => [w, x, y, z],
-                    false => [x, y, z, w],
-                };
+            group.put_scalars::<L>(here, ends, &self.frames.scalars, &mut self.states);
+            if has_bodies {
+                group.put_bodies::<L>(here, ends, self.frames, has_velocities, &mut self.states);
             }
         }
+    }
+}
+
+/// As many instances as a vector has lanes, or fewer at the end.
+struct Group<'a> {
+    first: usize,
+    count: usize,
+    steps: Option<&'a [FrameStep]>,
+    /// Whether velocities are those of the walk.
+    moves: bool,
+}
+
+impl Group<'_> {
+    #[inline(always)]
+    fn put_scalars<L: Lanes>(
+        &self,
+        here: &SampleScratch,
+        [before, after]: &[SampleScratch; 2],
+        scalars: &[u32],
+        states: &mut BodyStates<'_>,
+    ) {
+        let mut per_second = [0.0; MAX_LANES];
+        for (lane, step) in per_second.iter_mut().zip(self.steps.unwrap_or_default()) {
+            *lane = step.per_second;
+        }
+        let per_second = L::load(&per_second);
+        for (index, &word) in scalars.iter().enumerate() {
+            let [value, mut rate] = scalar::<L>(&here.tracks, word);
+            if self.steps.is_some() {
+                let [low, _] = scalar::<L>(&before.tracks, word);
+                let [high, _] = scalar::<L>(&after.tracks, word);
+                rate = ((high - low) * per_second).canonical();
+            }
+            let at = self.first * scalars.len() + index;
+            for (array, numbers) in [
+                (&mut *states.joint_values, value),
+                (&mut *states.joint_rates, rate),
+            ] {
+                let mut found = [0.0; MAX_LANES];
+                numbers.store(&mut found[..L::COUNT]);
+                let output = array.get_mut(at..).unwrap_or_default();
+                let output = output.iter_mut().step_by(scalars.len());
+                for (to, &number) in output.zip(&found[..self.count]) {
+                    *to = number;
+                }
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn put_bodies<L: Lanes>(
+        &self,
+        here: &mut SampleScratch,
+        ends: &mut [SampleScratch; 2],
+        frames: &TreeFrames,
+        has_velocities: bool,
+        states: &mut BodyStates<'_>,
+    ) {
+        let TreeFrames { bodies, points, .. } = frames;
+        for (index, (&body, &point)) in bodies.iter().zip(points).enumerate() {
+            let at = (self.first * bodies.len() + index, bodies.len());
+            here.find::<L>(body, self.moves);
+            let rows = &here.body;
+            let lanes = ..self.count;
+            put(
+                states.positions,
+                at,
+                &rows.positions[lanes],
+                |[x, y, z, _]| [x, y, z],
+            );
+            match frames.is_w_first {
+                true => put(
+                    states.rotations,
+                    at,
+                    &rows.rotations[lanes],
+                    |[x, y, z, w]| [w, x, y, z],
+                ),
+                false => put(states.rotations, at, &rows.rotations[lanes], |row| row),
+            }
+            if !has_velocities {
+                continue;
+            }
+            if point != body {
+                here.find::<L>(point, self.moves);
+            }
+            if let Some(steps) = self.steps {
+                for end in &mut *ends {
+                    end.find::<L>(point, false);
+                }
+                let ends = [&ends[0].body, &ends[1].body];
+                for (lane, step) in steps.iter().enumerate() {
+                    here.body.differ(lane, ends, step.per_second);
+                }
+            }
+            let rows = &here.body;
+            let three = |[x, y, z, _]: [f32; 4]| [x, y, z];
+            put(states.velocities, at, &rows.velocities[lanes], three);
+            put(
+                states.angular_velocities,
+                at,
+                &rows.angular_velocities[lanes],
+                three,
+            );
+        }
+    }
+}
+
+/// Stores a body's values of some instances, each so many elements after the one before, in an array that is not left
+/// out.
+#[inline(always)]
+fn put<T>(
+    array: &mut [T],
+    (first, step): (usize, usize),
+    rows: &[[f32; 4]],
+    of: fn([f32; 4]) -> T,
+) {
+    let output = array.get_mut(first..).unwrap_or_default();
+    for (value, row) in output.iter_mut().step_by(step).zip(rows) {
+        *value = of(*row);
     }
 }

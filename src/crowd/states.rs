@@ -597,10 +597,10 @@ impl PoseScratch {
 /// The states of as many instances as a vector has lanes, `[joint][instance]`. Positions and velocities end in a 0.
 #[derive(Default)]
 pub(super) struct StateRows {
-    rotations: Vec<[f32; 4]>,
-    positions: Vec<[f32; 4]>,
-    velocities: Vec<[f32; 4]>,
-    angular_velocities: Vec<[f32; 4]>,
+    pub(super) rotations: Vec<[f32; 4]>,
+    pub(super) positions: Vec<[f32; 4]>,
+    pub(super) velocities: Vec<[f32; 4]>,
+    pub(super) angular_velocities: Vec<[f32; 4]>,
 }
 
 /// A joint in its parent's frame, or in the world.
@@ -613,7 +613,7 @@ pub(super) struct Joint<N> {
 }
 
 /// The numbers of a joint's state.
-const JOINT_NUMBERS: usize = 13;
+pub(super) const JOINT_NUMBERS: usize = 13;
 
 impl StateRows {
     pub(super) fn resize(&mut self, count: usize) {
@@ -648,7 +648,7 @@ impl StateRows {
     }
 
     #[inline(always)]
-    fn joint<L: Lanes>(&self, joint: usize, moves: bool) -> Joint<L> {
+    pub(super) fn joint<L: Lanes>(&self, joint: usize, moves: bool) -> Joint<L> {
         let at = joint * L::COUNT;
         let zero = [L::all(0.0), L::all(0.0), L::all(0.0)];
         let [x, y, z, _] = L::load_rotations(&self.positions[at..]);
@@ -668,7 +668,7 @@ impl StateRows {
     }
 
     #[inline(always)]
-    fn put<L: Lanes>(&mut self, joint: usize, state: &Joint<L>, moves: bool) {
+    pub(super) fn put<L: Lanes>(&mut self, joint: usize, state: &Joint<L>, moves: bool) {
         let at = joint * L::COUNT..(joint + 1) * L::COUNT;
         let zero = L::all(0.0);
         L::store_rotations(state.rotation, &mut self.rotations[at.clone()]);
@@ -685,7 +685,7 @@ impl StateRows {
     /// Sets the velocities of an instance to the difference of two states, divided by the time between them,
     /// `1 / per_second`.
     #[inline(always)]
-    fn differ(&mut self, at: usize, ends: [&Self; 2], per_second: f32) {
+    pub(super) fn differ(&mut self, at: usize, ends: [&Self; 2], per_second: f32) {
         let [before, after] = ends.map(|end| end.state(at, false));
         let mut state = self.state(at, false);
         state.differ(&before, &after, per_second);
@@ -695,7 +695,7 @@ impl StateRows {
 
     /// One state; its velocities are 0 unless it moves.
     #[inline(always)]
-    pub(super) fn state(&self, at: usize, moves: bool) -> Joint<f32> {
+    fn state(&self, at: usize, moves: bool) -> Joint<f32> {
         let three = |[x, y, z, _]: [f32; 4]| [x, y, z];
         let velocity = |rows: &[[f32; 4]]| match moves {
             true => three(rows[at]),
@@ -712,7 +712,7 @@ impl StateRows {
 
 impl<L: Lanes> Joint<L> {
     #[inline(always)]
-    fn load(numbers: &[f32]) -> Self {
+    pub(super) fn load(numbers: &[f32]) -> Self {
         #[inline(always)]
         fn number<L: Lanes>(numbers: &[f32], index: usize) -> L {
             L::load_unordered(&numbers[index * L::COUNT..])
@@ -735,7 +735,7 @@ impl<L: Lanes> Joint<L> {
     }
 
     #[inline(always)]
-    fn store(self, numbers: &mut [f32]) {
+    pub(super) fn store(self, numbers: &mut [f32]) {
         let all = [
             &self.rotation[..],
             &self.position,
@@ -754,7 +754,7 @@ impl<L: Lanes> Joint<L> {
 impl Joint<f32> {
     /// Sets the velocities to the difference of two states, divided by the time between them, `1 / per_second`.
     #[inline(always)]
-    pub(super) fn differ(&mut self, before: &Self, after: &Self, per_second: f32) {
+    fn differ(&mut self, before: &Self, after: &Self, per_second: f32) {
         let [x, y, z] = before.position.map(|coordinate| -coordinate);
         self.velocity = scaled(sum(after.position, [x, y, z]), per_second).map(canonical);
         let [x, y, z, w] = before.rotation;
@@ -772,7 +772,7 @@ impl Joint<f32> {
 
 /// [`canonical`] of each number.
 #[inline(always)]
-fn canonical3<N: Number>([x, y, z]: [N; 3]) -> [N; 3] {
+pub(super) fn canonical3<N: Number>([x, y, z]: [N; 3]) -> [N; 3] {
     [x.canonical(), y.canonical(), z.canonical()]
 }
 

@@ -154,6 +154,15 @@ impl Choice for Eight {
     }
 
     #[inline(always)]
+    fn has_bits(self, mask: u32) -> EightFlags {
+        EightFlags(avx2! {
+            let mask = _mm256_set1_epi32(mask as i32);
+            let bits = _mm256_and_si256(_mm256_castps_si256(self.0), mask);
+            _mm256_castsi256_ps(_mm256_cmpeq_epi32(bits, mask))
+        })
+    }
+
+    #[inline(always)]
     fn choose(flags: EightFlags, accept: Self, reject: Self) -> Self {
         Self(avx2!(_mm256_blendv_ps(reject.0, accept.0, flags.0)))
     }

@@ -42,6 +42,9 @@ pub(crate) trait Choice: Number {
 
     fn equals(self, other: Self) -> Self::Flags;
 
+    /// Whether all bits of `mask`, which is not 0, are 1 in the number's representation.
+    fn has_bits(self, mask: u32) -> Self::Flags;
+
     /// `accept` where the answer is yes, else `reject`.
     fn choose(flags: Self::Flags, accept: Self, reject: Self) -> Self;
 }
@@ -57,6 +60,11 @@ impl Choice for f32 {
     #[inline(always)]
     fn equals(self, other: Self) -> bool {
         self == other
+    }
+
+    #[inline(always)]
+    fn has_bits(self, mask: u32) -> bool {
+        self.to_bits() & mask == mask
     }
 
     #[inline(always)]
@@ -275,6 +283,13 @@ impl Choice for Vec4 {
     }
 
     #[inline(always)]
+    fn has_bits(self, mask: u32) -> BVec4A {
+        let of = |number: f32| if number.has_bits(mask) { 1.0 } else { 0.0 };
+        let [x, y, z, w] = self.to_array();
+        Self::new(of(x), of(y), of(z), of(w)).cmpeq(Self::ONE)
+    }
+
+    #[inline(always)]
     fn choose(flags: BVec4A, accept: Self, reject: Self) -> Self {
         Self::select(flags, accept, reject)
     }
@@ -433,6 +448,13 @@ mod tests {
             loaded[c].sign().store(&mut stored);
             let signs = columns[c].iter().map(|&v| if v < 0.0 { -1.0 } else { 1.0 });
             assert!(stored.iter().copied().eq(signs));
+            for mask in [1 << 23, 3 << 22] {
+                let flags = loaded[c].has_bits(mask);
+                L::choose(flags, one, two).store(&mut stored);
+                let flags = columns[c].iter().map(|v| v.to_bits() & mask == mask);
+                let chosen = flags.map(|flag| if flag { 1.0 } else { 2.0 });
+                assert!(stored.iter().copied().eq(chosen));
+            }
             let least = columns[c].iter().copied().fold(f32::MAX, f32::min);
             assert!(loaded[c].any_at_most(least) && !loaded[c].any_at_most(least.next_down()));
             let within = loaded[c].at_most(two) & !loaded[c].equals(L::all(0.0));

@@ -81,6 +81,15 @@ impl Choice for Sixteen {
     }
 
     #[inline(always)]
+    fn has_bits(self, mask: u32) -> __mmask16 {
+        avx512! {
+            let mask = _mm512_set1_epi32(mask as i32);
+            let bits = _mm512_and_si512(_mm512_castps_si512(self.0), mask);
+            _mm512_cmpeq_epi32_mask(bits, mask)
+        }
+    }
+
+    #[inline(always)]
     fn choose(flags: __mmask16, accept: Self, reject: Self) -> Self {
         Self(avx512!(_mm512_mask_blend_ps(flags, reject.0, accept.0)))
     }

@@ -6,8 +6,9 @@ use tumble::crowd::{
     MotionBuilder, MotionTables,
 };
 use tumble::trees::{
-    BodyMotion, BodyOrder, BodyPose, BodyVelocity, FrameWords, JointKind, JointTracks, Mimic,
-    Siblings, Tree, TreeBody, TreeError, TreeFrames, TreeJoint,
+    BodyArrays, BodyMotion, BodyOrder, BodyPose, BodyRows, BodyVelocity, Configuration,
+    ConfigurationRates, FrameWords, JointKind, JointTracks, Mimic, Siblings, Tree, TreeBody,
+    TreeError, TreeFrames, TreeJoint,
 };
 use tumble::{Device, Engine, Skeleton, TrackSet, VectorMethod, method};
 
@@ -307,6 +308,69 @@ fn bodies_have_the_bits_of_the_cpu_on_every_device() {
             }
         }
     }
+}
+
+/// More configurations than a vector has lanes, and fewer at the end.
+#[test]
+fn bodies_of_many_configurations_have_the_bits_of_one() {
+    let mut random = Random(34);
+    let tree = robot(&mut random);
+    let order = tree.order(BodyOrder::BreadthFirst, Siblings::File);
+    let mut state = || {
+        let (mut at, mut rates) = (tree.rest(), tree.no_rates());
+        let mut rotation = || {
+            // Of any length.
+            let angle = random.between(-3.0, 3.0);
+            DQuat::from_axis_angle(random.direction(), angle) * random.between(0.5, 2.0)
+        };
+        at.balls[0] = rotation();
+        for pose in [&mut at.base, &mut at.free[0]] {
+            pose.rotation = rotation();
+        }
+        for velocity in [&mut rates.base, &mut rates.free[0]] {
+            (velocity.linear, velocity.angular) = (random.direction(), random.direction() * 2.0);
+        }
+        (at.base.position, at.free[0].position) = (random.direction(), random.direction() * 3.0);
+        rates.balls[0] = random.direction();
+        for value in at.scalars.iter_mut().chain(&mut rates.scalars) {
+            *value = random.between(-9.0, 9.0);
+        }
+        (at, rates)
+    };
+    let states: Vec<(Configuration, ConfigurationRates)> = (0..37).map(|_| state()).collect();
+    let expected = states.iter().flat_map(|(at, rates)| {
+        let all = tree.motions(at, rates).unwrap();
+        order.iter().map(|&body| all[body]).collect::<Vec<_>>()
+    });
+    let expected: Vec<BodyMotion> = expected.collect();
+    let at = |sample: usize, state: &mut _| *state = states[sample].clone();
+    let mut memory = tree.walk_memory();
+    let walk = tree.walk(&order, &[]).unwrap();
+    let mut found = vec![BodyMotion::default(); expected.len()];
+    let rows = BodyRows::Motions(&mut found);
+    walk.bodies_into(&mut memory, 37, at, rows).unwrap();
+    assert_eq!(found, expected);
+    // To arrays, with the velocities of other points.
+    let centres = mass_centres(&tree);
+    let walk = tree.walk(&order, &centres).unwrap();
+    let mut rotations = vec![[0.0; 4]; expected.len()];
+    let mut velocities = vec![[0.0; 3]; expected.len()];
+    let arrays = BodyArrays {
+        rotations: &mut rotations,
+        velocities: &mut velocities,
+        is_w_first: true,
+        ..BodyArrays::default()
+    };
+    walk.bodies_into(&mut memory, 37, at, BodyRows::Arrays(arrays))
+        .unwrap();
+    for (index, motion) in expected.iter().enumerate() {
+        let [w, x, y, z] = rotations[index];
+        assert_eq!([x, y, z, w], motion.pose.rotation.to_array());
+        let velocity = motion.velocity_at(centres[order[index % order.len()]]);
+        assert!(velocity.distance(velocities[index].into()) < 1e-13);
+    }
+    let refused = walk.bodies_into(&mut memory, 36, at, BodyRows::Motions(&mut found));
+    assert!(matches!(refused, Err(TreeError::Count { .. })));
 }
 
 #[test]

@@ -73,6 +73,9 @@ pub(crate) struct ReadingArguments {
     /// agree with the joints]
     #[arg(long, value_name = "ORDER", requires = "robot", value_parser = body_order())]
     source_body_order: Option<BodyOrder>,
+    /// Whether joints at rest are read with partners that move: the motion will be mirrored.
+    #[arg(skip)]
+    pub(crate) with_partners: bool,
     /// The robot, once it is read.
     #[arg(skip)]
     opened_robot: Arc<OnceLock<Arc<Robot>>>,
@@ -202,6 +205,7 @@ impl ReadingArguments {
             keyframes,
             robot,
             source_body_order: _,
+            with_partners: _,
             opened_robot: _,
             names_method: _,
             offsets,
@@ -275,6 +279,7 @@ impl ReadingArguments {
             keyframes: self.reads_file_keys(),
             has_body_model: self.body_model.is_some(),
             tracks: None,
+            with_partners: self.with_partners,
         })
     }
 

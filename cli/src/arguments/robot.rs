@@ -210,6 +210,17 @@ impl DialectArguments {
                 dialect.extension()
             )));
         }
+        if let (Some(out), Some(meaning)) = (results.out(), dialect.other_endings)
+            && let Some(ending) = out.extension().filter(|_| Format::of(out).is_some())
+            && !ending.eq_ignore_ascii_case(dialect.extension())
+            && !out.is_dir()
+        {
+            return Err(Failure::usage(format!(
+                "{}: {meaning}; end the output in .{}",
+                out.display(),
+                dialect.extension()
+            )));
+        }
         if self.velocity_at.is_some() && !dialect.has_bodies {
             return Err(Failure::usage(format!(
                 "--velocity-at has no effect on {}, which has no velocities of bodies; leave it out",

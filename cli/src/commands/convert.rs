@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use clap::Args;
 use tumble::{Device, Engine, EulerSequence, SampleTimes};
 use tumble_formats::dialect::write::WrittenDialect;
-use tumble_formats::format::{FormatOption, MotionOptions};
+use tumble_formats::format::{FormatOption, JointClip, MotionOptions};
 use tumble_formats::learning::{Mirror, MirrorError, mirrored, without_partner};
 use tumble_formats::motion::{Motion, ScalarKind};
 use tumble_formats::printable::printable;
@@ -80,7 +80,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let files = arguments.inputs.gather(false)?;
     let asked = arguments.dialect.format(&arguments.results)?;
     let options = arguments.command_line.options().of_command("convert");
-    let reader = arguments.inputs.clone();
+    let mut reader = arguments.inputs.clone();
+    reader.reading.with_partners = arguments.mirror.is_some();
     let work = PlannedWork {
         reader: &reader,
         options: &options,
@@ -238,7 +239,11 @@ impl Arguments {
             }
             Some(document) if replaces => {
                 note_weights(name, &clips);
-                let all: Vec<&Motion> = parts.iter().map(AsRef::as_ref).collect();
+                let whole = clips.iter().map(|clip| self.part(name, clip));
+                let whole: Vec<Cow<'_, Motion>> = whole.collect::<Result<_, Failure>>()?;
+                let both = parts.iter().zip(&whole);
+                let both = both.map(|(joints, weights)| JointClip { joints, weights });
+                let all: Vec<JointClip<'_>> = both.collect();
                 target
                     .write_motion(|out| document.write_joints(&all, &options, target.path(), out))?
             }

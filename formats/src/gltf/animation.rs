@@ -14,6 +14,7 @@ use crate::gltf::morphs::Morphs;
 use crate::gltf::nodes::Nodes;
 use crate::gltf::reader::GltfReader;
 use crate::gltf::schema::{Animation, AnimationExtras, Channel, Sampler, TargetPath};
+use crate::learning::mirror_pairs;
 use crate::motion::grid::restore;
 use crate::motion::{self, Channels, Joint, Motion};
 use crate::rate::Precision;
@@ -30,6 +31,16 @@ pub(super) struct ReadAnimation {
     pub(super) others: Vec<SampledChannel>,
     /// Number of channels that move anything else, such as a material.
     pub(super) beside: usize,
+}
+
+impl ReadAnimation {
+    /// The scalars that a channel moves.
+    pub(super) fn weights(&self, channel: usize) -> Option<Range<usize>> {
+        let mut channels = self.sampled.iter().chain(&self.others);
+        let found = channels.find(|read| read.channel == channel);
+        let found = found.filter(|read| read.path == TargetPath::Weights)?;
+        Some(found.scalars())
+    }
 }
 
 /// A channel that gets other keys when the file is written again.
@@ -80,7 +91,7 @@ pub(super) fn read(
         return Ok(None);
     }
     let (times, stored, rate) = times(reader, &moved, options)?;
-    let tracks = Tracks::of(nodes, &moved);
+    let tracks = Tracks::of(nodes, &moved, options.with_partners);
     reader.take(tracks.nodes.len(), TRACK, &pointer)?;
     // Memory for the names of the tracks, which each clip contains.
     let names = tracks.nodes.iter().map(|&node| nodes.name(node).len());
@@ -342,20 +353,29 @@ fn times(
     Ok((times, [first as f32, last as f32], rate))
 }
 
-/// The nodes that are tracks: those that are moved, their ancestors, and the other joints of their skins.
+/// The nodes that are tracks: those that are moved, their ancestors, and the other joints of their skins; if asked for,
+/// also their partners on the other side.
 struct Tracks {
     /// In the order of the file.
     nodes: Vec<usize>,
 }
 
 impl Tracks {
-    fn of(nodes: &Nodes, moved: &[MovedChannel]) -> Self {
+    fn of(nodes: &Nodes, moved: &[MovedChannel], with_partners: bool) -> Self {
         // Weights move no node.
         let moved = moved
             .iter()
             .filter(|moved| moved.path != TargetPath::Weights);
         let mut tracks: BTreeSet<usize> = moved.map(|moved| moved.node).collect();
         nodes.complete(&mut tracks);
+        if with_partners {
+            let names: Vec<&str> = (0..nodes.count()).map(|node| nodes.name(node)).collect();
+            let partners = mirror_pairs(&names);
+            let of_tracks = tracks.iter().map(|&node| partners[node]);
+            let of_tracks: Vec<usize> = of_tracks.filter(|&node| !nodes.is_origin(node)).collect();
+            tracks.extend(of_tracks);
+            nodes.complete(&mut tracks);
+        }
         Self {
             nodes: tracks.into_iter().collect(),
         }

@@ -16,7 +16,7 @@ use crate::gltf::quantized::quantized;
 use crate::gltf::schema::{Animation, Channel, TargetPath};
 use crate::gltf::write_new::{FLOAT, SHORT};
 use crate::gltf::written_keys::WrittenKeys;
-use crate::motion::{self, SampledClip};
+use crate::motion::{self, Motion, SampledClip};
 
 /// Converts f32 rotations to 16 bits for each component.
 fn shorts_of(bytes: &[u8]) -> Vec<u8> {
@@ -60,8 +60,13 @@ struct BakedSampler {
 
 /// Whether only a part of the animation is written.
 pub(super) fn is_cut(read: &ReadAnimation, sampled: &SampledClip<'_>) -> bool {
-    let span = sampled.clip.set.time_span();
-    sampled.is_at_keys && span.is_some_and(|(first, last)| [first, last] != read.span)
+    sampled.is_at_keys && is_part(read, sampled.clip)
+}
+
+/// Whether a clip is only a part of the animation.
+pub(super) fn is_part(read: &ReadAnimation, clip: &Motion) -> bool {
+    let span = clip.set.time_span();
+    span.is_some_and(|(first, last)| [first, last] != read.span)
 }
 
 impl<'a> AnimationBaker<'a> {

@@ -7,7 +7,9 @@ use serde_json::value::RawValue;
 use tumble::Channel as VectorChannel;
 
 use crate::diagnostic::{Code, Diagnostic};
-use crate::format::WriteError;
+use crate::format::{JointClip, WriteError};
+use crate::gltf::animation::ReadAnimation;
+use crate::gltf::bake::is_part;
 use crate::gltf::edits::Edits;
 use crate::gltf::json::JsonMembers;
 use crate::gltf::key_bytes::KeyBytes;
@@ -100,61 +102,75 @@ pub(super) fn replace_animations(
 }
 
 /// Replaces the channels of joints in the animations of a file by the keys of clips, each in the animation of its index.
-/// Everything else of the animations stays: names, morph weights, and other animations. Returns the new bytes, for the next
-/// buffer view.
+/// Morph weights are cut if their clip is. Everything else of the animations stays: names, and other animations. Returns
+/// the new bytes, for the next buffer view.
 ///
 /// # Errors
 /// As [`replace_animations`].
 pub(super) fn replace_joints(
     reader: &GltfReader<'_>,
     nodes: &Nodes,
-    clips: &[&Motion],
+    (clips, animations): (&[JointClip<'_>], &[Option<ReadAnimation>]),
     output: &str,
     edits: &mut Edits<'_>,
 ) -> Result<Vec<u8>, WriteError> {
     let mut writer = ChannelWriter::new(nodes, output, edits);
     let entries = reader.json.entries("animations");
-    for clip in clips {
-        let pointer = format!("/animations/{}", clip.index);
-        let Some(&raw) = entries.get(clip.index) else {
+    for &JointClip { joints, weights } in clips {
+        let index = joints.index;
+        let pointer = format!("/animations/{index}");
+        let Some(&raw) = entries.get(index) else {
             continue;
         };
+        let read = animations.get(index).and_then(Option::as_ref);
+        let cut = read.filter(|read| is_part(read, weights));
         let before: Animation<'_> = reader.json.typed(raw, &pointer)?;
         let (mut channels, mut samplers) = (Vec::new(), Vec::new());
+        let mut kept: HashMap<usize, usize> = HashMap::new();
         let mut moves_joints = false;
-        for raw in &before.channels {
+        for (index_in_file, raw) in before.channels.iter().enumerate() {
             let channel: Channel = reader.json.typed(raw, &pointer)?;
             let moved = channel.target.moves();
             if moved.is_some_and(|(_, path)| path != TargetPath::Weights) {
                 moves_joints = true;
                 continue;
             }
-            let sampler = samplers.iter().position(|&kept| kept == channel.sampler);
-            let sampler = sampler.unwrap_or_else(|| {
-                samplers.push(channel.sampler);
-                samplers.len() - 1
-            });
+            let keys = cut.and_then(|read| read.weights(index_in_file));
+            let keys = keys.and_then(|scalars| WrittenKeys::of_scalars(weights, scalars));
+            let sampler = match keys {
+                Some(keys) => {
+                    let sampler = writer.sampler(index, 1, (&keys, TargetPath::Weights), edits)?;
+                    samplers.push(serde_json::to_string(&sampler).map_err(std::io::Error::from)?);
+                    samplers.len() - 1
+                }
+                None => {
+                    let Some(raw) = before.samplers.get(channel.sampler) else {
+                        continue;
+                    };
+                    *kept.entry(channel.sampler).or_insert_with(|| {
+                        samplers.push(raw.get().to_owned());
+                        samplers.len() - 1
+                    })
+                }
+            };
             let members: JsonMembers<'_> = reader.json.typed(raw, &pointer)?;
             channels.push(object(&members, &[("sampler", sampler.to_string())]));
         }
-        if !moves_joints {
+        if !moves_joints && cut.is_none() {
             continue;
         }
         let mut animation = NewAnimation::default();
-        writer.add(&mut animation, (clip.index, clip), AtRest::LeftOut, edits)?;
+        writer.add(&mut animation, (index, joints), AtRest::LeftOut, edits)?;
         if animation.channels.is_empty() {
-            writer.add(&mut animation, (clip.index, clip), AtRest::Written, edits)?;
+            writer.add(&mut animation, (index, joints), AtRest::Written, edits)?;
         }
         // Samplers without keys.
-        if animation.channels.is_empty() {
+        if animation.channels.is_empty() && moves_joints {
             continue;
         }
-        let kept = samplers.len();
-        let kept_samplers = samplers.iter();
-        let kept_samplers = kept_samplers.filter_map(|&sampler| before.samplers.get(sampler));
-        let mut samplers: Vec<String> = kept_samplers.map(|raw| raw.get().to_owned()).collect();
+        let first = samplers.len();
         for mut channel in animation.channels {
-            channel.sampler += kept;
+            channel.sampler += first;
             channels.push(serde_json::to_string(&channel).map_err(std::io::Error::from)?);
         }
         for sampler in animation.samplers {
@@ -235,10 +251,8 @@ impl<'a> ChannelWriter<'a> {
                 if is_at_rest && at_rest == AtRest::LeftOut {
                     continue;
                 }
-                let times = f32_times(clip.set.track_count(), &keys.times)
-                    .map_err(|why| self.refuse(index, why))?;
-                let input = self.bytes.input(&times, edits);
-                let output = self.bytes.output(&keys, path, edits);
+                let tracks = clip.set.track_count();
+                let sampler = self.sampler(index, tracks, (&keys, path), edits)?;
                 animation.channels.push(NewChannel {
                     sampler: animation.samplers.len(),
                     target: NewTarget {
@@ -246,14 +260,28 @@ impl<'a> ChannelWriter<'a> {
                         path: path.name(),
                     },
                 });
-                animation.samplers.push(NewSampler {
-                    input,
-                    output,
-                    interpolation: keys.sampler.name(),
-                });
+                animation.samplers.push(sampler);
             }
         }
         Ok(())
+    }
+
+    /// Adds the keys of a channel of the clip with this index, which has so many tracks.
+    fn sampler(
+        &mut self,
+        index: usize,
+        tracks: usize,
+        (keys, path): (&WrittenKeys, TargetPath),
+        edits: &mut Edits<'_>,
+    ) -> Result<NewSampler, Diagnostic> {
+        let times = f32_times(tracks, &keys.times).map_err(|why| self.refuse(index, why))?;
+        let input = self.bytes.input(&times, edits);
+        let output = self.bytes.output(keys, path, edits);
+        Ok(NewSampler {
+            input,
+            output,
+            interpolation: keys.sampler.name(),
+        })
     }
 }
 
@@ -278,8 +306,8 @@ fn repeats_rest(clip: &Motion, track: usize, path: TargetPath) -> bool {
 }
 
 /// The bytes of the keys of clips, at most.
-pub(super) fn key_bytes(clips: &[&Motion]) -> u64 {
+pub(super) fn key_bytes<'a>(clips: impl Iterator<Item = &'a Motion>) -> u64 {
     // Times, values and two tangents of three channels.
-    let keys = clips.iter().map(|clip| clip.key_count() as u64);
+    let keys = clips.map(|clip| clip.key_count() as u64);
     4 * (1 + 3 * 4) * keys.sum::<u64>()
 }

@@ -7,10 +7,10 @@ use serde_json::value::RawValue;
 use tumble::{FrameRate, SampleTimes};
 
 use crate::diagnostic::{Code, Diagnostic};
-use crate::format::{Document, Format, MotionOptions, WriteError, check_times};
+use crate::format::{Document, Format, JointClip, MotionOptions, WriteError, check_times};
 use crate::gltf::FORMAT;
 use crate::gltf::animation::ReadAnimation;
-use crate::gltf::bake::{AnimationBaker, is_cut};
+use crate::gltf::bake::{AnimationBaker, is_cut, is_part};
 use crate::gltf::character;
 use crate::gltf::container::{Container, check_length};
 use crate::gltf::data::BufferData;
@@ -170,7 +170,7 @@ impl Document for GltfDocument {
 
     fn write_joints(
         &self,
-        clips: &[&Motion],
+        clips: &[JointClip<'_>],
         options: &MotionOptions,
         path: &Path,
         out: &mut dyn Write,
@@ -186,7 +186,7 @@ enum Change<'a> {
     /// All animations.
     Animations(&'a [&'a Motion]),
     /// The channels of joints in the animations that these clips were read from.
-    Joints(&'a [&'a Motion]),
+    Joints(&'a [JointClip<'a>]),
 }
 
 impl GltfDocument {
@@ -214,7 +214,11 @@ impl GltfDocument {
         };
         let more = match change {
             Change::Keys(clips) => self.baked(clips).map(sample_bytes).sum(),
-            Change::Animations(clips) | Change::Joints(clips) => character::key_bytes(clips),
+            Change::Animations(clips) => character::key_bytes(clips.iter().copied()),
+            Change::Joints(clips) => {
+                let both = clips.iter().flat_map(|clip| [clip.joints, clip.weights]);
+                character::key_bytes(both)
+            }
         };
         check_length(&json, data.length_with(more))?;
         if !self.container.is_glb() && !is_text {
@@ -225,13 +229,23 @@ impl GltfDocument {
                 let quantize = options.quantize.is_some();
                 self.bake(&reader, (clips, quantize), &mut edits, &mut data)?
             }
-            Change::Animations(clips) | Change::Joints(clips) => {
-                let nodes = Nodes::read(&json)?;
-                let replace = match change {
-                    Change::Joints(_) => character::replace_joints,
-                    _ => character::replace_animations,
+            Change::Animations(_) | Change::Joints(_) => {
+                let (nodes, name) = (Nodes::read(&json)?, &options.name);
+                let bytes = match change {
+                    Change::Joints(clips) => {
+                        for clip in *clips {
+                            self.note_whole(&reader, clip.joints.index, |read| {
+                                is_part(read, clip.weights)
+                            });
+                        }
+                        let clips = (*clips, &self.animations[..]);
+                        character::replace_joints(&reader, &nodes, clips, name, &mut edits)?
+                    }
+                    Change::Animations(clips) => {
+                        character::replace_animations(&reader, &nodes, clips, name, &mut edits)?
+                    }
+                    Change::Keys(_) => Vec::new(),
                 };
-                let bytes = replace(&reader, &nodes, clips, &options.name, &mut edits)?;
                 data.append(&mut edits, &bytes);
                 !bytes.is_empty()
             }
@@ -299,18 +313,7 @@ impl GltfDocument {
         let mut is_baked = false;
         for (read, (index, sampled)) in self.baked(clips) {
             let cuts = is_cut(read, sampled);
-            if cuts && read.beside > 0 {
-                reader.warn(Code::StaysWhole, &format!("/animations/{index}"), || {
-                    let channels = match read.beside {
-                        1 => "1 channel of another property is".to_owned(),
-                        count => format!("{count} channels of other properties are"),
-                    };
-                    format!(
-                        "{channels} not cut but copied whole, at their times; the animation is as long as its \
-                         longest channel"
-                    )
-                });
-            }
+            self.note_whole(reader, *index, |_| cuts);
             if !read.sampled.is_empty() || cuts {
                 let json = reader.json;
                 let mut baking =
@@ -321,6 +324,30 @@ impl GltfDocument {
             }
         }
         Ok(is_baked)
+    }
+
+    /// Warns of channels that stay as long as they are in an animation that is cut.
+    fn note_whole(
+        &self,
+        reader: &GltfReader<'_>,
+        index: usize,
+        is_cut: impl Fn(&ReadAnimation) -> bool,
+    ) {
+        let Some(Some(read)) = self.animations.get(index) else {
+            return;
+        };
+        if read.beside == 0 || !is_cut(read) {
+            return;
+        }
+        reader.warn(Code::StaysWhole, &format!("/animations/{index}"), || {
+            let channels = match read.beside {
+                1 => "1 channel of another property is".to_owned(),
+                count => format!("{count} channels of other properties are"),
+            };
+            format!(
+                "{channels} not cut but copied whole, at their times; the animation is as long as its longest channel"
+            )
+        });
     }
 
     fn refuse(&self, animation: usize, code: Code, message: String) -> Diagnostic {

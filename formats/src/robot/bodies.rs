@@ -5,8 +5,8 @@ use std::f64::consts::TAU;
 use glam::{DQuat, DVec3, Quat};
 use rayon::prelude::*;
 use tumble::trees::{
-    BodyMotion, BodyOrder, BodyPose, BodyVelocity, Configuration, ConfigurationRates, JointKind,
-    Siblings, Tree, TreeBody, TreeError, TreeJoint,
+    BodyArrays, BodyMotion, BodyOrder, BodyPose, BodyRows, BodyVelocity, Configuration,
+    ConfigurationRates, JointKind, Siblings, Tree, TreeBody, TreeError, TreeJoint, TreeWalk,
 };
 use tumble::{
     Axes, Channel, Engine, Error, Interpolation, Layout, Quantity, SampleTimes, ScalarQuantity,
@@ -239,8 +239,21 @@ pub fn bodies(
         (LimitRule::Clamp, Some(_)) => clamp(tree, &mut all),
         _ => {}
     }
-    let of_sample = |sample: usize, state: &mut _| *state = all[sample].clone();
-    let motions = motions(tree, all.len(), &order, &centres, of_sample)?;
+    let of_sample = |sample: usize, (at, rates): &mut (Configuration, ConfigurationRates)| {
+        let (from, from_rates) = &all[sample];
+        (at.base, rates.base) = (from.base, from_rates.base);
+        at.free.copy_from_slice(&from.free);
+        at.balls.copy_from_slice(&from.balls);
+        at.scalars.copy_from_slice(&from.scalars);
+        rates.free.copy_from_slice(&from_rates.free);
+        rates.balls.copy_from_slice(&from_rates.balls);
+        rates.scalars.copy_from_slice(&from_rates.scalars);
+    };
+    let mut motions = bytemuck::zeroed_vec(all.len().saturating_mul(order.len()));
+    let rows = motions.chunks_mut((TASK * order.len()).max(1));
+    let rows = rows.map(BodyRows::Motions).collect();
+    let walk = tree.walk(&order, &centres)?;
+    walk_all(&walk, tree, all.len(), of_sample, rows)?;
     let first = order.iter().position(|&body| body == 0);
     let rows = motions.chunks(order.len().max(1));
     let roots = rows.filter_map(|row| Some(row[first?].pose)).collect();
@@ -325,33 +338,46 @@ fn clamp(tree: &Tree, all: &mut [(Configuration, ConfigurationRates)]) {
     }
 }
 
-/// The bodies of configurations, in an order of bodies, one configuration after the other. `at` sets each, in a state that
-/// is that of [`Tree::rest`] or that of another configuration. With `centres` ([`mass_centres`]), linear velocities are those of these points.
+/// How many configurations a thread computes before it takes more.
+const TASK: usize = 256;
+
+/// The bodies of configurations in an order of bodies, `[configuration][body]`, to arrays. `at` sets each, in a state that
+/// is that of [`Tree::rest`] or that of another configuration. With `centres` ([`mass_centres`]), linear velocities are
+/// those of these points.
 ///
 /// # Errors
-/// When a configuration has not one finite value for each joint.
-pub fn motions(
+/// When a configuration has not one finite value for each joint, or an array is neither empty nor as long as the
+/// configurations times the bodies.
+pub fn body_arrays(
     tree: &Tree,
     count: usize,
     order: &[usize],
     centres: &[DVec3],
     at: impl Fn(usize, &mut (Configuration, ConfigurationRates)) + Sync,
-) -> Result<Vec<BodyMotion>, TreeError> {
-    let mut all = vec![BodyMotion::default(); count.saturating_mul(order.len())];
-    let rows = all.par_chunks_mut(order.len().max(1)).enumerate();
-    let buffers = || ((tree.rest(), tree.no_rates()), Vec::new());
-    rows.try_for_each_init(buffers, |(state, bodies), (sample, row)| {
-        at(sample, state);
-        tree.motions_into(&state.0, &state.1, bodies)?;
-        for (motion, &body) in row.iter_mut().zip(order) {
-            *motion = bodies[body];
-            if let Some(&centre) = centres.get(body) {
-                motion.velocity.linear = motion.velocity_at(centre);
-            }
-        }
-        Ok::<(), TreeError>(())
-    })?;
-    Ok(all)
+    mut arrays: BodyArrays<'_>,
+) -> Result<(), TreeError> {
+    let tasks = 0..count.div_ceil(TASK);
+    let rows = tasks.map(|_| BodyRows::Arrays(arrays.split_off(TASK * order.len())));
+    walk_all(&tree.walk(order, centres)?, tree, count, at, rows.collect())
+}
+
+/// Computes the bodies of tasks of configurations, each to its rows.
+fn walk_all(
+    walk: &TreeWalk,
+    tree: &Tree,
+    count: usize,
+    at: impl Fn(usize, &mut (Configuration, ConfigurationRates)) + Sync,
+    rows: Vec<BodyRows<'_>>,
+) -> Result<(), TreeError> {
+    let tasks = rows.into_par_iter().enumerate();
+    tasks.try_for_each_init(
+        || tree.walk_memory(),
+        |memory, (task, rows)| {
+            let first = task * TASK;
+            let at = |sample, state: &mut _| at(first + sample, state);
+            walk.bodies_into(memory, TASK.min(count - first), at, rows)
+        },
+    )
 }
 
 /// The points of bodies whose velocities are asked for: centres of mass, in the order of [`Tree::bodies`], or none for

@@ -19,7 +19,7 @@ use tumble::trees::{Configuration, Tree};
 pub(crate) use assign::joints_of;
 pub use bodies::{
     Bodies, BodiesError, BodiesRequest, LimitExcess, LimitRule, VelocityPoint, VelocitySource,
-    bodies, clamp_scalars, mass_centres, motions, scalar_excesses, unwrap_angles, unwrap_joint,
+    bodies, body_arrays, clamp_scalars, mass_centres, scalar_excesses, unwrap_angles, unwrap_joint,
 };
 pub use library::{LARGEST_ANGLE, RobotClipError, RobotTracks};
 pub use merge::FixedBodies;

@@ -2,8 +2,7 @@
 
 use glam::{DQuat, DVec3};
 
-use crate::math::quaternion::sine_cosine;
-use crate::pose::tree::{JointKind, JointValue, Tree, TreeBody, TreeError, TreeJoint};
+use crate::pose::tree::{JointCounts, JointKind, Tree, TreeBody, TreeError};
 
 /// A value for each joint of a [`Tree`].
 #[derive(Debug, Clone, PartialEq)]
@@ -32,7 +31,7 @@ pub struct ConfigurationRates {
 }
 
 /// The position and rotation of a body.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, bytemuck::Zeroable)]
 pub struct BodyPose {
     /// The position of its origin in metres.
     pub position: DVec3,
@@ -41,7 +40,7 @@ pub struct BodyPose {
 }
 
 /// The velocities of a body.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, bytemuck::Zeroable)]
 pub struct BodyVelocity {
     /// The velocity of its origin in m/s.
     pub linear: DVec3,
@@ -50,7 +49,7 @@ pub struct BodyVelocity {
 }
 
 /// A body in the world, and its velocities in the world's axes.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, bytemuck::Zeroable)]
 pub struct BodyMotion {
     /// Its pose.
     pub pose: BodyPose,
@@ -79,83 +78,6 @@ impl BodyMotion {
     pub fn velocity_at(&self, point: DVec3) -> DVec3 {
         let BodyVelocity { linear, angular } = self.velocity;
         linear + angular.cross(self.pose.rotation * point)
-    }
-
-    /// A child of this body before its joints act.
-    pub(super) fn with(self, child: &TreeBody) -> Self {
-        let Self { pose, velocity } = self;
-        Self {
-            velocity: BodyVelocity {
-                linear: self.velocity_at(child.position),
-                ..velocity
-            },
-            pose: BodyPose {
-                position: pose.position + pose.rotation * child.position,
-                rotation: pose.rotation * child.rotation,
-            },
-        }
-    }
-
-    /// After a free joint: in the world, or relative to where the body is.
-    pub(super) fn freely(self, pose: BodyPose, rate: BodyVelocity, is_relative: bool) -> Self {
-        let rotation = pose.rotation.normalize();
-        if !is_relative {
-            let pose = BodyPose { rotation, ..pose };
-            return Self {
-                pose,
-                velocity: rate,
-            };
-        }
-        let axes = self.pose.rotation;
-        Self {
-            velocity: BodyVelocity {
-                linear: self.velocity_at(pose.position) + axes * rate.linear,
-                angular: self.velocity.angular + axes * rate.angular,
-            },
-            pose: BodyPose {
-                position: self.pose.position + axes * pose.position,
-                rotation: axes * rotation,
-            },
-        }
-    }
-
-    /// After a hinge turned by `value` rad, or a slide shifted by `value` metres.
-    pub(super) fn by_scalar(self, joint: &TreeJoint, value: f64, rate: f64) -> Self {
-        let axis = self.pose.rotation * joint.axis;
-        if joint.kind == JointKind::Hinge {
-            let (sine, cosine) = sine_cosine(value * 0.5);
-            let [x, y, z] = (joint.axis * sine).to_array();
-            let rotation = DQuat::from_xyzw(x, y, z, cosine);
-            return self.about(joint.anchor, rotation, axis * rate);
-        }
-        let (shift, mut moved) = (axis * value, self);
-        moved.velocity.linear += self.velocity.angular.cross(shift) + axis * rate;
-        moved.pose.position += shift;
-        moved
-    }
-
-    /// After a rotation about an anchor; `rate` is the angular velocity in the world's axes.
-    pub(super) fn about(self, anchor: DVec3, rotation: DQuat, rate: DVec3) -> Self {
-        let Self { pose, velocity } = self;
-        let rotation = pose.rotation * rotation;
-        // Most joints turn about the origins of their bodies, which stay where they are.
-        if anchor == DVec3::ZERO {
-            return Self {
-                pose: BodyPose { rotation, ..pose },
-                velocity: BodyVelocity {
-                    angular: velocity.angular + rate,
-                    ..velocity
-                },
-            };
-        }
-        let fixed = pose.position + pose.rotation * anchor;
-        let position = fixed - rotation * anchor;
-        let angular = velocity.angular + rate;
-        let linear = self.velocity_at(anchor) + angular.cross(position - fixed);
-        Self {
-            pose: BodyPose { position, rotation },
-            velocity: BodyVelocity { linear, angular },
-        }
     }
 }
 
@@ -194,20 +116,8 @@ impl Tree {
 }
 
 impl Configuration {
-    pub(super) fn scalar(&self, value: JointValue) -> f64 {
-        match value {
-            JointValue::Scalar {
-                index,
-                multiplier,
-                offset,
-            } => multiplier * self.scalars[index] + offset,
-            JointValue::Ball(_) | JointValue::Free(_) => 0.0,
-        }
-    }
-
     /// Refuses values that are not finite, or not one for each joint.
-    pub(super) fn check(&self, tree: &Tree) -> Result<(), TreeError> {
-        let counts = tree.counts;
+    pub(super) fn check(&self, counts: JointCounts) -> Result<(), TreeError> {
         check_counts([
             ("free joints", self.free.len(), counts.free),
             ("balls", self.balls.len(), counts.balls),
@@ -227,18 +137,8 @@ impl Configuration {
 const LARGEST_SCALAR: f64 = 1e8;
 
 impl ConfigurationRates {
-    pub(super) fn scalar(&self, value: JointValue) -> f64 {
-        match value {
-            JointValue::Scalar {
-                index, multiplier, ..
-            } => multiplier * self.scalars[index],
-            JointValue::Ball(_) | JointValue::Free(_) => 0.0,
-        }
-    }
-
     /// Refuses rates that are not finite, or not one for each joint.
-    pub(super) fn check(&self, tree: &Tree) -> Result<(), TreeError> {
-        let counts = tree.counts;
+    pub(super) fn check(&self, counts: JointCounts) -> Result<(), TreeError> {
         check_counts([
             ("rates of free joints", self.free.len(), counts.free),
             ("rates of balls", self.balls.len(), counts.balls),
@@ -257,7 +157,10 @@ fn is_rotation(q: DQuat) -> bool {
     square.is_finite() && square > 1e-12
 }
 
-fn check_counts(counts: [(&'static str, usize, usize); 3]) -> Result<(), TreeError> {
+/// Refuses more or fewer values of a kind than there should be.
+pub(super) fn check_counts<const N: usize>(
+    counts: [(&'static str, usize, usize); N],
+) -> Result<(), TreeError> {
     let other = counts
         .into_iter()
         .find(|(_, found, expected)| found != expected);

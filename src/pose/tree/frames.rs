@@ -1,9 +1,11 @@
-//! A tree as a list of frames, each of which moves by at most one joint: what kernels walk.
+//! A tree as frames with constants in f32: what kernels walk.
 
-use glam::{DQuat, DVec3};
+use glam::DVec3;
 
 use crate::math::canonical::canonical;
-use crate::pose::tree::{JointKind, JointValue, Tree, TreeError, TreeJoint};
+use crate::pose::tree::configuration::check_counts;
+use crate::pose::tree::joint_frames::{FrameMotion, JointFrames};
+use crate::pose::tree::{JointValue, Tree, TreeError, TreeJoint};
 use crate::shader::{
     FRAME_BALL, FRAME_FIXED, FRAME_FREE, FRAME_HINGE, FRAME_ROOT, FRAME_SLIDE, NO_FRAME, POSITION,
     STATE_VECTORS, TreeFrame, VECTOR_WORDS,
@@ -138,37 +140,6 @@ impl TreeFrames {
     }
 }
 
-/// The frames of a tree while they are made.
-struct Frames(Vec<TreeFrame>);
-
-impl Frames {
-    /// Adds a frame that does not move in the frame above it, and returns its index.
-    fn fixed(&mut self, above: u32, offset: DVec3, rest: DQuat) -> u32 {
-        let root = self.0.get(above as usize).map_or(NO_FRAME, |it| it.root);
-        self.0.push(TreeFrame {
-            offset: offset.to_array().map(rounded),
-            above,
-            rest: rest.to_array().map(rounded),
-            axis: [0.0; 3],
-            kind: FRAME_FIXED,
-            source: 0,
-            root,
-            multiplier: 0.0,
-            shift: 0.0,
-        });
-        self.0.len() as u32 - 1
-    }
-
-    /// Adds a frame that moves in the world as a track does.
-    fn of_world(&mut self, track: u32) -> u32 {
-        let index = self.fixed(NO_FRAME, DVec3::ZERO, DQuat::IDENTITY);
-        let frame = &mut self.0[index as usize];
-        (frame.kind, frame.source) = (FRAME_ROOT, first_word(track));
-        frame.root = frame.source;
-        index
-    }
-}
-
 /// The first word of a track; one that is in no table for a track that does not exist.
 fn first_word(track: u32) -> u32 {
     track.saturating_mul(TRACK_WORDS)
@@ -194,95 +165,60 @@ impl Tree {
         points: &[DVec3],
     ) -> Result<TreeFrames, TreeError> {
         let counts = self.counts();
-        let count = |kind, found, expected| match found == expected {
-            true => Ok(()),
-            false => Err(TreeError::Count {
-                kind,
-                found,
-                expected,
-            }),
-        };
-        count("tracks of free joints", tracks.free.len(), counts.free)?;
-        count("tracks of balls", tracks.balls.len(), counts.balls)?;
-        count("tracks of scalars", tracks.scalars.len(), counts.scalars)?;
-        if !points.is_empty() {
-            count("points", points.len(), self.bodies.len())?;
-        }
-        if let Some(&body) = bodies.iter().find(|&&body| body >= self.bodies.len()) {
-            return Err(TreeError::MissingBody {
-                body,
-                count: self.bodies.len(),
-            });
-        }
+        check_counts([
+            ("tracks of free joints", tracks.free.len(), counts.free),
+            ("tracks of balls", tracks.balls.len(), counts.balls),
+            ("tracks of scalars", tracks.scalars.len(), counts.scalars),
+        ])?;
+        self.check_bodies(bodies, points)?;
         self.check_constants(points)?;
         let word = |[track, coordinate]: [u32; 2]| {
             first_word(track).saturating_add((POSITION * VECTOR_WORDS).saturating_add(coordinate))
         };
-        let mut frames = Frames(Vec::new());
-        let base = tracks.base.map(|track| frames.of_world(track));
-        let mut of_bodies: Vec<u32> = Vec::with_capacity(self.bodies.len());
-        let mut values = self.values.iter();
-        for body in &self.bodies {
-            let parent = body.parent.map(|parent| of_bodies[parent]);
-            let above = parent.or(base).unwrap_or(NO_FRAME);
-            // The pose of the next frame in the one above, and the origin of that in the axes of the body.
-            let (mut last, mut offset, mut rest) = (above, body.position, body.rotation);
-            let mut origin = DVec3::ZERO;
-            for (joint, value) in body.joints.iter().zip(&mut values) {
-                let anchor = match joint.kind {
-                    JointKind::Hinge | JointKind::Ball => joint.anchor,
-                    JointKind::Slide | JointKind::Free => origin,
-                };
-                last = match (*value, parent) {
-                    (JointValue::Free(index), None) => frames.of_world(tracks.free[index]),
-                    _ => frames.fixed(last, offset + rest * (anchor - origin), rest),
-                };
-                let frame = &mut frames.0[last as usize];
-                match *value {
-                    JointValue::Free(_) if parent.is_none() => {}
-                    JointValue::Free(index) => {
-                        (frame.kind, frame.source) = (FRAME_FREE, first_word(tracks.free[index]));
-                    }
-                    JointValue::Ball(index) => {
-                        (frame.kind, frame.source) = (FRAME_BALL, first_word(tracks.balls[index]));
-                    }
-                    JointValue::Scalar {
-                        index,
-                        multiplier,
-                        offset,
-                    } => {
-                        frame.kind = match joint.kind {
-                            JointKind::Hinge => FRAME_HINGE,
-                            _ => FRAME_SLIDE,
-                        };
-                        frame.axis = joint.axis.to_array().map(rounded);
-                        frame.source = word(tracks.scalars[index]);
-                        frame.multiplier = rounded(multiplier);
-                        frame.shift = rounded(offset - joint.reference);
-                    }
+        let JointFrames {
+            frames: all,
+            bodies: of_bodies,
+            points: of_points,
+        } = JointFrames::new(self, tracks.base.is_some(), points);
+        let mut frames: Vec<TreeFrame> = Vec::with_capacity(all.len());
+        for frame in &all {
+            let above = frame.above.map(|above| &frames[above]);
+            let mut made = TreeFrame {
+                offset: frame.offset.to_array().map(rounded),
+                above: frame.above.map_or(NO_FRAME, |above| above as u32),
+                rest: frame.rest.to_array().map(rounded),
+                axis: [0.0; 3],
+                kind: FRAME_FIXED,
+                source: 0,
+                root: above.map_or(NO_FRAME, |above| above.root),
+                multiplier: 0.0,
+                shift: 0.0,
+            };
+            (made.kind, made.source) = match frame.motion {
+                FrameMotion::Fixed => (FRAME_FIXED, 0),
+                FrameMotion::Base => (FRAME_ROOT, first_word(tracks.base.unwrap_or_default())),
+                FrameMotion::Root(index) => (FRAME_ROOT, first_word(tracks.free[index])),
+                FrameMotion::Free(index) => (FRAME_FREE, first_word(tracks.free[index])),
+                FrameMotion::Ball(index) => (FRAME_BALL, first_word(tracks.balls[index])),
+                FrameMotion::Hinge(scalar) => (FRAME_HINGE, word(tracks.scalars[scalar.index])),
+                FrameMotion::Slide(scalar) => (FRAME_SLIDE, word(tracks.scalars[scalar.index])),
+            };
+            match frame.motion {
+                FrameMotion::Base | FrameMotion::Root(_) => made.root = made.source,
+                FrameMotion::Hinge(scalar) | FrameMotion::Slide(scalar) => {
+                    made.axis = scalar.axis.to_array().map(rounded);
+                    made.multiplier = rounded(scalar.multiplier);
+                    made.shift = rounded(scalar.shift);
                 }
-                (offset, rest, origin) = (DVec3::ZERO, DQuat::IDENTITY, anchor);
+                FrameMotion::Fixed | FrameMotion::Free(_) | FrameMotion::Ball(_) => {}
             }
-            let is_at_origin = !body.joints.is_empty() && origin == DVec3::ZERO;
-            of_bodies.push(match is_at_origin {
-                true => last,
-                false => frames.fixed(last, offset - origin, rest),
-            });
+            frames.push(made);
         }
-        let of_points: Vec<u32> = (points.iter().zip(&of_bodies))
-            .map(|(&point, &body)| match point == DVec3::ZERO {
-                true => body,
-                false => frames.fixed(body, point, DQuat::IDENTITY),
-            })
-            .collect();
-        let at = |list: &[u32]| bodies.iter().map(|&body| list[body]).collect::<Vec<u32>>();
+        let at = |list: &[usize]| bodies.iter().map(|&body| list[body] as u32).collect();
         Ok(TreeFrames {
-            points: match points {
-                [] => at(&of_bodies),
-                _ => at(&of_points),
-            },
+            points: at(&of_points),
             bodies: at(&of_bodies),
-            frames: frames.0,
+            frames,
             scalars: tracks.scalars.iter().map(|&scalar| word(scalar)).collect(),
             is_w_first: false,
         })

@@ -4,23 +4,28 @@
 //! * [`Tree`]: [`TreeBody`]s, each with the [`TreeJoint`]s that connect it with its parent.
 //! * [`Configuration`]: a value for each joint; [`ConfigurationRates`]: how fast they change.
 //! * [`Tree::frames`]: constants in f32, with which libraries of motions compute the bodies, on the CPU or on a device.
-//! * [`Tree::poses`] and [`Tree::motions`] compute the bodies in f64, with the same bits on every processor.
+//! * [`Tree::poses`] and [`Tree::motions`] compute the bodies in f64, with the same bits on every processor;
+//!   [`Tree::walk`] those of many configurations.
 //!
 //! The formulas are those of `MuJoCo`'s kinematics (`mj_kinematics`): a body's joints act in their order, each about
 //! its anchor.
 
 mod configuration;
 pub(crate) mod frames;
+mod joint_frames;
 mod kinematics;
 mod order;
+mod walk;
 
 use glam::{DQuat, DVec3};
 
 pub use configuration::{BodyMotion, BodyPose, BodyVelocity, Configuration, ConfigurationRates};
 pub use frames::{FrameWords, JointTracks, TreeFrames};
+pub use kinematics::{BodyArrays, BodyRows, TreeWalk, WalkMemory};
 pub use order::{BodyOrder, Siblings};
 
 use crate::names::names;
+use configuration::check_counts;
 
 /// The bodies of a robot, each after its parent.
 #[derive(Debug, Clone, PartialEq)]
@@ -29,6 +34,8 @@ pub struct Tree {
     /// Where the value of each joint is found, body by body.
     values: Vec<JointValue>,
     counts: JointCounts,
+    /// All bodies, in order.
+    walk: TreeWalk,
 }
 
 /// A rigid part of a robot.
@@ -239,11 +246,15 @@ impl Tree {
             check_body(body)?;
         }
         let (values, counts) = joint_values(&joints().collect::<Vec<_>>())?;
-        Ok(Self {
+        let order: Vec<usize> = (0..bodies.len()).collect();
+        let mut tree = Self {
             bodies,
             values,
             counts,
-        })
+            walk: TreeWalk::default(),
+        };
+        tree.walk = tree.walk(&order, &[])?;
+        Ok(tree)
     }
 
     /// The bodies, parents before their children.
@@ -282,6 +293,18 @@ impl Tree {
     #[must_use]
     pub fn counts(&self) -> JointCounts {
         self.counts
+    }
+
+    /// Refuses bodies that do not exist, and points that are neither none nor one for each body of the tree.
+    fn check_bodies(&self, bodies: &[usize], points: &[DVec3]) -> Result<(), TreeError> {
+        let count = self.bodies.len();
+        if !points.is_empty() {
+            check_counts([("points", points.len(), count)])?;
+        }
+        match bodies.iter().find(|&&body| body >= count) {
+            None => Ok(()),
+            Some(&body) => Err(TreeError::MissingBody { body, count }),
+        }
     }
 }
 

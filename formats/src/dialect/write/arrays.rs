@@ -25,6 +25,7 @@ pub(super) static MJLAB: WrittenDialect = WrittenDialect {
     quaternions: Some(ComponentOrder::Wxyz),
     assumed_rate: None,
     has_whole_rate: true,
+    other_endings: None,
     takes_descriptions: true,
     write: |motion, out| write(motion, &TRACKER, out),
 };

@@ -23,6 +23,7 @@ pub(super) static UNITREE: WrittenDialect = WrittenDialect {
     quaternions: Some(ComponentOrder::Xyzw),
     assumed_rate: Some(30),
     has_whole_rate: false,
+    other_endings: None,
     takes_descriptions: false,
     write: |motion, out| write(motion, ComponentOrder::Xyzw, out),
 };

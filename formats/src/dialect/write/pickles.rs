@@ -27,6 +27,7 @@ pub(super) static GMR: WrittenDialect = WrittenDialect {
     quaternions: Some(ComponentOrder::Xyzw),
     assumed_rate: None,
     has_whole_rate: false,
+    other_endings: None,
     takes_descriptions: false,
     write: write_gmr,
 };

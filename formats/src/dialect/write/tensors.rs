@@ -18,6 +18,7 @@ pub(super) static PROTOMOTIONS: WrittenDialect = WrittenDialect {
     summary: "`.motion` of ProtoMotions: joints and bodies, x y z w, velocities of origins; no contacts",
     format: "torch",
     has_bodies: true,
+    other_endings: Some("ProtoMotions reads .pt as a library of clips, and a clip as .motion"),
     write,
     ..GMR
 };
