@@ -130,7 +130,7 @@ fn keys_of_lines(curve: &ChannelCurve) -> Option<(u32, Vec<[f32; 4]>)> {
 
 /// The key at the end of a span. The last span is constant: its key is at both ends.
 #[inline(always)]
-fn next(index: usize, count: usize) -> usize {
+pub(super) fn next(index: usize, count: usize) -> usize {
     (index + 1).min(count - 1)
 }
 
@@ -253,6 +253,19 @@ impl<'a> KeyRows<'a> {
             let row = |span: u32| &self.cells[self.first + span as usize * self.stride..];
             arcs_between::<L>(row(span), row(end), arcs);
         }
+    }
+
+    /// The arc in a span, of the first of the channels: its middle and its tangent.
+    #[inline(always)]
+    pub(crate) fn arc(&self, span: u32) -> [[f32; 4]; 2] {
+        let mut keys = [[[0.0; 4]]; 2];
+        let ends = [span, next(span as usize, self.rows) as u32];
+        for (key, span) in keys.iter_mut().zip(ends) {
+            self.copy(span, key);
+        }
+        let [[start], [end]] = keys;
+        let (middle, tangent) = arc_between(start, end);
+        [middle, tangent]
     }
 
     /// The line in a span: its middle and its rise.
