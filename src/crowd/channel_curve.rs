@@ -1,5 +1,7 @@
 //! The curve of one channel of a clip, before it is stored in the tables of a library.
 
+use std::sync::Arc;
+
 use crate::shader::{
     CrowdSpan, FORM_ARC, FORM_CONSTANT, FORM_CUBIC, FORM_CUBIC_KEYS, FORM_KEYS, FORM_LINE,
     FORM_PACKED, POWERS, PolynomialSegment,
@@ -12,7 +14,8 @@ use crate::twin::arc_between::arc_between;
 #[derive(Default)]
 pub(crate) struct ChannelCurve {
     pub(crate) form: u32,
-    pub(crate) spans: Vec<CrowdSpan>,
+    /// Curves with the same key times share them.
+    pub(crate) spans: Arc<Vec<CrowdSpan>>,
     /// The constants of each span; their number depends on the form.
     pub(crate) constants: Vec<[f32; 4]>,
     /// The key at the start of each span, 0 if there is none. Samples at a tick have its bits if the span says that it
@@ -55,7 +58,7 @@ impl ChannelCurve {
 
     /// Adds a span with its constants, as many as the form has.
     pub(crate) fn push(&mut self, span: CrowdSpan, constants: &[[f32; 4]], key: Option<SpanKey>) {
-        self.spans.push(span);
+        Arc::make_mut(&mut self.spans).push(span);
         self.constants.extend_from_slice(constants);
         self.keys.push(key.map_or([0.0; 4], |key| key.value));
         self.key_indices.push(key.map_or(NONE, |key| key.index));

@@ -122,20 +122,44 @@ pub(super) fn put_states<L: Lanes>(
     numbers: &[f32],
     states: &mut MotionStates<'_>,
 ) {
-    let zero = L::all(0.0);
     for (joint, numbers) in (0..joints).zip(numbers.chunks_exact(JOINT_NUMBERS * L::COUNT)) {
         let state = Joint::<L>::load(numbers);
         let at = (joint, joints);
         put::<L, _>(states.world_rotations, state.rotation, at, |row| row);
         let [x, y, z] = state.position;
-        put::<L, _>(states.positions, [x, y, z, zero], at, three);
+        put::<L, _>(states.positions, [x, y, z, L::all(0.0)], at, three);
         if values == PoseValues::Velocities {
-            let [x, y, z] = state.velocity;
-            put::<L, _>(states.velocities, [x, y, z, zero], at, three);
-            let [x, y, z] = state.angular_velocity;
-            put::<L, _>(states.angular_velocities, [x, y, z, zero], at, three);
+            put_velocities(&state, at, states);
         }
     }
+}
+
+/// Stores the velocities of a group that are differences between two states, the numbers of which are `ends`.
+#[inline(always)]
+pub(super) fn put_differences<L: Lanes>(
+    per_second: &[f32; MAX_LANES],
+    joints: usize,
+    [before, after]: &[Vec<f32>; 2],
+    states: &mut MotionStates<'_>,
+) {
+    let each = JOINT_NUMBERS * L::COUNT;
+    let pairs = before.chunks_exact(each).zip(after.chunks_exact(each));
+    let per_second = L::load(per_second);
+    for (joint, (before, after)) in (0..joints).zip(pairs) {
+        let (before, after) = (Joint::<L>::load(before), Joint::<L>::load(after));
+        let mut state = before;
+        state.differ(&before, &after, per_second);
+        put_velocities(&state, (joint, joints), states);
+    }
+}
+
+#[inline(always)]
+fn put_velocities<L: Lanes>(state: &Joint<L>, at: (usize, usize), states: &mut MotionStates<'_>) {
+    let zero = L::all(0.0);
+    let [x, y, z] = state.velocity;
+    put::<L, _>(states.velocities, [x, y, z, zero], at, three);
+    let [x, y, z] = state.angular_velocity;
+    put::<L, _>(states.angular_velocities, [x, y, z, zero], at, three);
 }
 
 fn three([x, y, z, _]: [f32; 4]) -> [f32; 3] {

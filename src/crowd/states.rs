@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use crate::crowd::channel_curve::constants_of;
 use crate::crowd::clip_keys::{KeyRows, keeps_keys};
 use crate::crowd::clip_tables::{ClipTables, arcs, runs_of};
-use crate::crowd::lane_states::{Group, put_states, walk};
+use crate::crowd::lane_states::{Group, put_differences, put_states, walk};
 use crate::crowd_error::CrowdError;
 use crate::engine::Engine;
 use crate::math::canonical::canonical;
@@ -23,10 +23,10 @@ use crate::shader::{
 };
 use crate::simd::cache_line::request;
 use crate::simd::dispatch::{InLanes, in_lanes_of};
-use crate::simd::lanes::{Lanes, MAX_LANES, Number};
+use crate::simd::lanes::{Choice, Lanes, MAX_LANES, Number};
 use crate::threads::stop;
 use crate::twin::Evaluate as _;
-use crate::twin::arc_tangent::{arc_tangent, flushed, reciprocal, root};
+use crate::twin::arc_tangent::{acute_angle, flushed, reciprocal, root};
 use crate::twin::crowd_layers::sampled;
 use crate::twin::crowd_times::position_at;
 use crate::twin::quaternion::rotated;
@@ -567,8 +567,8 @@ struct StateScratch {
     pose: PoseScratch,
     /// The numbers of the states of a group of instances.
     numbers: Vec<f32>,
-    /// The states at both ends of the steps of the group.
-    ends: [StateRows; 2],
+    /// Those at both ends of their steps.
+    ends: [Vec<f32>; 2],
 }
 
 /// Scratch memory for poses.
@@ -656,10 +656,10 @@ impl BasePosition {
 /// The states of as many instances as a vector has lanes, `[joint][instance]`. Positions and velocities end in a 0.
 #[derive(Default)]
 pub(super) struct StateRows {
-    pub(super) rotations: Vec<[f32; 4]>,
-    pub(super) positions: Vec<[f32; 4]>,
-    pub(super) velocities: Vec<[f32; 4]>,
-    pub(super) angular_velocities: Vec<[f32; 4]>,
+    rotations: Vec<[f32; 4]>,
+    positions: Vec<[f32; 4]>,
+    velocities: Vec<[f32; 4]>,
+    angular_velocities: Vec<[f32; 4]>,
 }
 
 /// A joint in its parent's frame, or in the world.
@@ -683,20 +683,6 @@ impl StateRows {
             &mut self.angular_velocities,
         ] {
             rows.resize(count, [0.0; 4]);
-        }
-    }
-
-    /// Sets the rotations and positions to those of a group of instances, whose numbers are `numbers`.
-    #[inline(always)]
-    fn fill<L: Lanes>(&mut self, numbers: &[f32]) {
-        let joints = self.rotations.len() / L::COUNT;
-        let each = JOINT_NUMBERS * L::COUNT;
-        for (joint, numbers) in numbers.chunks_exact(each).take(joints).enumerate() {
-            let state = Joint::<L>::load(numbers);
-            let at = joint * L::COUNT..(joint + 1) * L::COUNT;
-            L::store_rotations(state.rotation, &mut self.rotations[at.clone()]);
-            let [x, y, z] = state.position;
-            L::store_rotations([x, y, z, L::all(0.0)], &mut self.positions[at]);
         }
     }
 
@@ -758,22 +744,25 @@ impl<L: Lanes> Joint<L> {
     }
 }
 
-impl Joint<f32> {
+impl<N: Choice> Joint<N> {
     /// Sets the velocities to the difference of two states, divided by the time between them, `1 / per_second`.
     #[inline(always)]
-    pub(super) fn differ(&mut self, before: &Self, after: &Self, per_second: f32) {
-        let [x, y, z] = before.position.map(|coordinate| -coordinate);
-        self.velocity = scaled(sum(after.position, [x, y, z]), per_second).map(canonical);
+    pub(super) fn differ(&mut self, before: &Self, after: &Self, per_second: N) {
+        let [x, y, z] = before.position;
+        let moved = sum(after.position, [-x, -y, -z]);
+        self.velocity = canonical3(scaled(moved, per_second));
         let [x, y, z, w] = before.rotation;
-        let [x, y, z, w] = product(after.rotation, [-x, -y, -z, w]).map(flushed);
+        let [x, y, z, w] = product(after.rotation, [-x, -y, -z, w]);
+        let [x, y, z, w] = [flushed(x), flushed(y), flushed(z), flushed(w)];
+        let zero = N::all(0.0);
         let sine = root(x * x + y * y + z * z);
+        let is_long = !zero.at_most(w);
+        let cosine = N::choose(is_long, -w, w);
         // The shorter arc, by the rotation vector's length; 0 if the angle is.
-        let scale = match sine == 0.0 {
-            true => 0.0,
-            false => 2.0 * arc_tangent(sine, w.abs()) * reciprocal(sine),
-        };
-        let scale = if w < 0.0 { -scale } else { scale };
-        self.angular_velocity = scaled([x, y, z], scale * per_second).map(canonical);
+        let scale = N::all(2.0) * acute_angle(sine, cosine) * reciprocal(sine);
+        let scale = N::choose(sine.equals(zero), zero, scale);
+        let scale = N::choose(is_long, -scale, scale);
+        self.angular_velocity = canonical3(scaled([x, y, z], scale * per_second));
     }
 }
 
@@ -910,27 +899,15 @@ impl InLanes for StatesTask<'_, '_> {
                     at,
                     located: &pose.located,
                 };
-                group.pose::<L>(PoseValues::World, &mut [], numbers);
-                walk::<L>(&tables.links, PoseValues::World, numbers);
-                end.resize(joints * L::COUNT);
-                end.fill::<L>(numbers);
+                end.resize(numbers.len(), 0.0);
+                group.pose::<L>(PoseValues::World, &mut [], end);
+                walk::<L>(&tables.links, PoseValues::World, end);
             }
-            let [before, after] = &*ends;
-            for (lane, step) in steps.iter().enumerate() {
-                for joint in 0..joints {
-                    let at = joint * L::COUNT + lane;
-                    let (before, after) = (before.state(at, false), after.state(at, false));
-                    let mut state = before;
-                    state.differ(&before, &after, step.per_second);
-                    let output = lane * joints + joint;
-                    if let Some(velocity) = outputs.velocities.get_mut(output) {
-                        *velocity = state.velocity;
-                    }
-                    if let Some(velocity) = outputs.angular_velocities.get_mut(output) {
-                        *velocity = state.angular_velocity;
-                    }
-                }
+            let mut per_second = [0.0; MAX_LANES];
+            for (per_second, step) in per_second.iter_mut().zip(steps) {
+                *per_second = step.per_second;
             }
+            put_differences::<L>(&per_second, joints, ends, &mut outputs);
         }
     }
 }
