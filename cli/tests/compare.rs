@@ -1178,6 +1178,50 @@ fn directories_are_compared_file_by_file() {
     assert!(refused.code == 2 && refused.words.contains("(--json lists all pairs of files)"));
 }
 
+/// Two directories of trajectories: the errors of every estimate, with the limits of absolute errors.
+#[test]
+fn directories_of_trajectories_have_a_table_of_errors() {
+    let temporary = sample_folder();
+    let folder = temporary.path();
+    for (side, offset) in [("truth", 0.0), ("estimate", 0.5)] {
+        std::fs::create_dir(folder.join(side)).unwrap();
+        for (name, factor) in [("a.tum", 1.0), ("b.tum", 2.0)] {
+            let x = |second: u32| f64::from(second) + factor * offset;
+            let pose = |second: u32| format!("{second} {} 0 0 0 0 0 1\n", x(second));
+            let poses: String = (0..5).map(pose).collect();
+            std::fs::write(folder.join(side).join(name), poses).unwrap();
+        }
+    }
+    let line = ["compare", "truth", "estimate", "--rpe", "1s"];
+    let both = [&line[..], &["--ape"]].concat();
+    let report = String::from_utf8(succeed(folder, &both).out).unwrap();
+    let expected = "  file   errors    count  translation rmse  max  rotation rmse  max
+  a.tum  absolute      5               0.5  0.5             0°   0°
+  a.tum  relative      4                 0    0             0°   0°
+  b.tum  absolute      5                 1    1             0°   0°
+  b.tum  relative      4                 0    0             0°   0°
+2 pairs of trajectories
+";
+    assert_eq!(report, expected);
+    let limit = ["--distance", "0.75"];
+    let (code, found) = json(folder, &[&both[..], &limit, &["--json"]].concat());
+    let rmse = &found["pairs"][1]["trajectory"]["ape"]["translation"]["rmse"];
+    assert_eq!((code, rmse), (8, &1.0.into()), "{found}");
+    let failed = run(folder, &[&both[..], &limit].concat());
+    assert!(
+        failed.words.contains("1 pair over the limit"),
+        "{}",
+        failed.words
+    );
+    let refused = run(folder, &[&line[..], &limit].concat());
+    let expected = "--tolerance and --distance are limits of absolute errors; add --ape";
+    assert!(
+        refused.code == 2 && refused.words.contains(expected),
+        "{}",
+        refused.words
+    );
+}
+
 /// A program that reads the JSON can open the files of these names; a terminal gets no line feed of a name.
 #[cfg(unix)]
 #[test]

@@ -172,7 +172,12 @@ pub(crate) fn state<'py>(py: Python<'py>, clip: &Clip) -> PyResult<Bound<'py, Py
     Ok(state)
 }
 
-/// An entry of a state; the error if it is missing, as in a state of another version.
+/// An entry that earlier versions did not write, because clips had no such property.
+fn later_entry<'py>(state: &Bound<'py, PyDict>, name: &str) -> PyResult<Option<Bound<'py, PyAny>>> {
+    Ok(state.get_item(name)?.filter(|value| !value.is_none()))
+}
+
+/// An entry that every version wrote; the error if it is missing.
 fn entry<'py>(state: &Bound<'py, PyDict>, name: &str) -> PyResult<Bound<'py, PyAny>> {
     state.get_item(name)?.ok_or_else(|| {
         input(format!(
@@ -317,8 +322,11 @@ fn motion_of(state: &Bound<'_, PyDict>) -> PyResult<Motion> {
         i64,
     );
     let mut scalars = Vec::new();
-    let all: Vec<Scalars<'_>> = entry(state, "scalars")?.extract()?;
-    for (name, times, keys, tangents, kind, origin, limits, interpolation) in all {
+    let all = later_entry(state, "scalars")?.map(|all| all.extract());
+    let all: Option<Vec<Scalars<'_>>> = all.transpose()?;
+    for (name, times, keys, tangents, kind, origin, limits, interpolation) in
+        all.unwrap_or_default()
+    {
         let (times, keys): (Vec<f64>, Vec<f32>) = (list(&times)?, list(&keys)?);
         let tangents: Vec<[f32; 2]> = chunks(&tangents)?;
         set.push_scalar(name, &times, &keys, &tangents)
@@ -346,9 +354,12 @@ fn motion_of(state: &Bound<'_, PyDict>) -> PyResult<Motion> {
     let rate: Option<String> = entry(state, "rate")?.extract()?;
     let rate = rate.map(|rate| rate.parse()).transpose();
     let pelvis: Option<[f32; 3]> = entry(state, "pelvis")?.extract()?;
-    let betas: Option<Vec<f64>> = entry(state, "betas")?.extract()?;
-    let gender: Option<String> = entry(state, "gender")?.extract()?;
-    let up: Option<[f64; 3]> = entry(state, "up")?.extract()?;
+    let betas = later_entry(state, "betas")?.map(|betas| betas.extract());
+    let betas: Option<Vec<f64>> = betas.transpose()?;
+    let gender = later_entry(state, "gender")?.map(|gender| gender.extract());
+    let gender: Option<String> = gender.transpose()?;
+    let up = later_entry(state, "up")?.map(|up| up.extract());
+    let up: Option<[f64; 3]> = up.transpose()?;
     let shape = Shape {
         betas: betas.unwrap_or_default(),
         gender: gender.unwrap_or_default(),

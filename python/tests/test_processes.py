@@ -166,6 +166,21 @@ def test_clips_are_pickled_whole(clip, tmp_path, shared):
                 assert np.array_equal(array, expected)
 
 
+def test_pickles_of_earlier_versions_are_read(tmp_path):
+    """They have no entries for properties that clips did not have then."""
+    path = tmp_path / "walk.npz"
+    np.savez(path, poses=np.zeros((4, 66)), trans=np.zeros((4, 3)), mocap_framerate=30.0)
+    clip = tumble.load(path).clip
+    (state,) = clip.__reduce_ex__(5)[1]
+    for entry in ("up", "betas", "gender", "scalars"):
+        del state[entry]
+        assert tumble._tumble.clip_of_state(state) == clip
+    # The direction that points up is stored since.
+    turned = tumble.load(path, up="y").clip
+    (state,) = turned.__reduce_ex__(5)[1]
+    assert state.pop("up") is not None and tumble._tumble.clip_of_state(state) != turned
+
+
 def test_clips_that_differ_are_not_the_same(clip, rng):
     times, keys = np.linspace(0, 2, 20), unit(rng, 3, 20)
     plain = tumble.Clip(times, keys)

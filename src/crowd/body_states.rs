@@ -3,9 +3,10 @@
 
 use rayon::prelude::*;
 
+use crate::crowd::lane_states::{Group, put, three};
 use crate::crowd::states::{
-    FrameStep, JOINT_NUMBERS, MotionTables, PoseScratch, PoseValues, Poses, StateRows, TASK,
-    check_clips, check_steps,
+    FrameStep, JOINT_NUMBERS, MotionTables, PoseScratch, PoseValues, Poses, TASK, check_clips,
+    check_steps, ends_of_steps, steps_per_second,
 };
 use crate::crowd::tree_walk::{FRAME_NUMBERS, frame, scalar, walk};
 use crate::crowd_error::CrowdError;
@@ -205,46 +206,41 @@ impl BodyStates<'_> {
 #[derive(Default)]
 struct BodyScratch {
     pose: PoseScratch,
-    rotations: Vec<[f32; 4]>,
     here: SampleScratch,
     /// Those at both ends of a step.
     ends: [SampleScratch; 2],
 }
 
-/// The states of as many instances as a vector has lanes.
+/// The numbers of all tracks and of all frames of a group of instances, each as a vector.
 #[derive(Default)]
 struct SampleScratch {
-    rows: StateRows,
-    /// The numbers of all tracks and of all frames, each as a vector.
     tracks: Vec<f32>,
     frames: Vec<f32>,
-    /// One body.
-    body: StateRows,
 }
 
 impl SampleScratch {
-    fn resize<L: Lanes>(&mut self, tracks: usize, frames: usize) {
-        self.rows.resize(tracks * L::COUNT);
+    /// Computes the tracks and the frames of a group.
+    #[inline(always)]
+    fn compute<L: Lanes>(
+        &mut self,
+        poses: Poses<'_>,
+        at: &[(u32, u32)],
+        (frames, values): (&[TreeFrame], PoseValues),
+        pose: &mut PoseScratch,
+    ) {
+        let tracks = poses.tables.joint_count();
         self.tracks.resize(tracks * JOINT_NUMBERS * L::COUNT, 0.0);
-        self.frames.resize(frames * FRAME_NUMBERS * L::COUNT, 0.0);
-        self.body.resize(L::COUNT);
-    }
-
-    /// Computes the frames from the rows; without `frames` only the tracks.
-    #[inline(always)]
-    fn walk<L: Lanes>(&mut self, frames: &[TreeFrame], moves: bool) {
-        let each = JOINT_NUMBERS * L::COUNT;
-        for (track, numbers) in self.tracks.chunks_exact_mut(each).enumerate() {
-            self.rows.joint::<L>(track, moves).store(numbers);
-        }
+        self.frames
+            .resize(frames.len() * FRAME_NUMBERS * L::COUNT, 0.0);
+        poses.locate(at, pose);
+        let group = Group {
+            poses,
+            at,
+            located: &pose.located,
+        };
+        group.pose::<L>(values, &mut [], &mut self.tracks);
+        let moves = values == PoseValues::Velocities;
         walk::<L>(frames, &self.tracks, moves, &mut self.frames);
-    }
-
-    /// Sets the body to a frame.
-    #[inline(always)]
-    fn find<L: Lanes>(&mut self, index: u32, moves: bool) {
-        let state = frame::<L>(&self.frames, index);
-        self.body.put::<L>(0, &state, moves);
     }
 }
 
@@ -261,14 +257,13 @@ struct BodyTask<'a, 'b> {
 impl InLanes for BodyTask<'_, '_> {
     #[inline(always)]
     fn run<L: Lanes>(&mut self) {
-        let states = &self.states;
+        let states = &mut self.states;
         let has_velocities =
             !(states.velocities.is_empty() && states.angular_velocities.is_empty());
         let has_bodies =
             has_velocities || !(states.positions.is_empty() && states.rotations.is_empty());
         let has_rates = has_velocities || !states.joint_rates.is_empty();
-        let moves = has_rates && self.steps.is_none();
-        let values = match moves {
+        let values = match has_rates && self.steps.is_none() {
             true => PoseValues::Velocities,
             false => PoseValues::World,
         };
@@ -277,167 +272,99 @@ impl InLanes for BodyTask<'_, '_> {
             true => &self.frames.frames[..],
             false => &[],
         };
-        let joints = self.poses.tables.joint_count();
-        let BodyScratch {
-            pose,
-            rotations,
-            here,
-            ends,
-        } = &mut *self.memory;
-        rotations.resize(joints, [0.0; 4]);
-        pose.resize::<L>(joints);
-        for sample in [&mut *here].into_iter().chain(&mut *ends) {
-            sample.resize::<L>(joints, self.frames.frames.len());
-        }
+        let each = [self.frames.scalars.len(), self.frames.bodies.len()];
+        let BodyScratch { pose, here, ends } = &mut *self.memory;
         for (group, instances) in self.at.chunks(L::COUNT).enumerate() {
-            let first = group * L::COUNT;
-            let steps = steps.map(|steps| &steps[first..][..instances.len()]);
-            for (lane, &(clip, tick)) in instances.iter().enumerate() {
-                let row = (&mut here.rows, lane);
-                (self.poses).compute::<L>((clip, tick), values, pose, rotations, row);
-                for step in steps.iter().flat_map(|steps| steps.get(lane)) {
-                    for (end, tick) in ends.iter_mut().zip(step.ticks) {
-                        let row = (&mut end.rows, lane);
-                        let values = PoseValues::World;
-                        (self.poses).compute::<L>((clip, tick), values, pose, rotations, row);
-                    }
+            let mut outputs = states.split_off(each.map(|count| count * instances.len()));
+            here.compute::<L>(self.poses, instances, (frames, values), pose);
+            let mut differences = None;
+            if let Some(steps) = steps {
+                let steps = &steps[group * L::COUNT..][..instances.len()];
+                for (side, end) in ends.iter_mut().enumerate() {
+                    let at = ends_of_steps(instances, steps, side);
+                    let at = &at[..instances.len()];
+                    end.compute::<L>(self.poses, at, (frames, PoseValues::World), pose);
                 }
+                differences = Some(Differences {
+                    ends: &*ends,
+                    per_second: L::load(&steps_per_second(steps)),
+                });
             }
-            here.walk::<L>(frames, moves);
-            if steps.is_some() {
-                for end in &mut *ends {
-                    end.walk::<L>(frames, false);
-                }
-            }
-            let group = Group {
-                first,
-                count: instances.len(),
-                steps,
-                moves,
-            };
-            group.put_scalars::<L>(here, ends, &self.frames.scalars, &mut self.states);
+            put_scalars(here, &differences, &self.frames.scalars, &mut outputs);
             if has_bodies {
-                group.put_bodies::<L>(here, ends, self.frames, has_velocities, &mut self.states);
+                put_bodies(here, &differences, self.frames, &mut outputs);
             }
         }
     }
 }
 
-/// As many instances as a vector has lanes, or fewer at the end.
-struct Group<'a> {
-    first: usize,
-    count: usize,
-    steps: Option<&'a [FrameStep]>,
-    /// Whether velocities are those of the walk.
-    moves: bool,
+/// The states of a group at both ends of its steps, whose differences are its velocities.
+struct Differences<'a, L> {
+    ends: &'a [SampleScratch; 2],
+    per_second: L,
 }
 
-impl Group<'_> {
-    #[inline(always)]
-    fn put_scalars<L: Lanes>(
-        &self,
-        here: &SampleScratch,
-        [before, after]: &[SampleScratch; 2],
-        scalars: &[u32],
-        states: &mut BodyStates<'_>,
-    ) {
-        let mut per_second = [0.0; MAX_LANES];
-        for (lane, step) in per_second.iter_mut().zip(self.steps.unwrap_or_default()) {
-            *lane = step.per_second;
-        }
-        let per_second = L::load(&per_second);
-        for (index, &word) in scalars.iter().enumerate() {
-            let [value, mut rate] = scalar::<L>(&here.tracks, word);
-            if self.steps.is_some() {
-                let [low, _] = scalar::<L>(&before.tracks, word);
-                let [high, _] = scalar::<L>(&after.tracks, word);
-                rate = ((high - low) * per_second).canonical();
-            }
-            let at = self.first * scalars.len() + index;
-            for (array, numbers) in [
-                (&mut *states.joint_values, value),
-                (&mut *states.joint_rates, rate),
-            ] {
-                let mut found = [0.0; MAX_LANES];
-                numbers.store(&mut found[..L::COUNT]);
-                let output = array.get_mut(at..).unwrap_or_default();
-                let output = output.iter_mut().step_by(scalars.len());
-                for (to, &number) in output.zip(&found[..self.count]) {
-                    *to = number;
-                }
-            }
-        }
-    }
-
-    #[inline(always)]
-    fn put_bodies<L: Lanes>(
-        &self,
-        here: &mut SampleScratch,
-        ends: &mut [SampleScratch; 2],
-        frames: &TreeFrames,
-        has_velocities: bool,
-        states: &mut BodyStates<'_>,
-    ) {
-        let TreeFrames { bodies, points, .. } = frames;
-        for (index, (&body, &point)) in bodies.iter().zip(points).enumerate() {
-            let at = (self.first * bodies.len() + index, bodies.len());
-            here.find::<L>(body, self.moves);
-            let rows = &here.body;
-            let lanes = ..self.count;
-            put(
-                states.positions,
-                at,
-                &rows.positions[lanes],
-                |[x, y, z, _]| [x, y, z],
-            );
-            match frames.is_w_first {
-                true => put(
-                    states.rotations,
-                    at,
-                    &rows.rotations[lanes],
-                    |[x, y, z, w]| [w, x, y, z],
-                ),
-                false => put(states.rotations, at, &rows.rotations[lanes], |row| row),
-            }
-            if !has_velocities {
-                continue;
-            }
-            if point != body {
-                here.find::<L>(point, self.moves);
-            }
-            if let Some(steps) = self.steps {
-                for end in &mut *ends {
-                    end.find::<L>(point, false);
-                }
-                let ends = [&ends[0].body, &ends[1].body];
-                for (lane, step) in steps.iter().enumerate() {
-                    here.body.differ(lane, ends, step.per_second);
-                }
-            }
-            let rows = &here.body;
-            let three = |[x, y, z, _]: [f32; 4]| [x, y, z];
-            put(states.velocities, at, &rows.velocities[lanes], three);
-            put(
-                states.angular_velocities,
-                at,
-                &rows.angular_velocities[lanes],
-                three,
-            );
-        }
-    }
-}
-
-/// Stores a body's values of some instances, each so many elements after the one before, in an array that is not left
-/// out.
 #[inline(always)]
-fn put<T>(
-    array: &mut [T],
-    (first, step): (usize, usize),
-    rows: &[[f32; 4]],
-    of: fn([f32; 4]) -> T,
+fn put_scalars<L: Lanes>(
+    here: &SampleScratch,
+    differences: &Option<Differences<'_, L>>,
+    scalars: &[u32],
+    states: &mut BodyStates<'_>,
 ) {
-    let output = array.get_mut(first..).unwrap_or_default();
-    for (value, row) in output.iter_mut().step_by(step).zip(rows) {
-        *value = of(*row);
+    for (index, &word) in scalars.iter().enumerate() {
+        let [value, mut rate] = scalar::<L>(&here.tracks, word);
+        if let Some(Differences { ends, per_second }) = differences {
+            let [low, high] = ends.each_ref().map(|end| scalar::<L>(&end.tracks, word)[0]);
+            rate = ((high - low) * *per_second).canonical();
+        }
+        for (array, numbers) in [
+            (&mut *states.joint_values, value),
+            (&mut *states.joint_rates, rate),
+        ] {
+            let mut found = [0.0; MAX_LANES];
+            numbers.store(&mut found[..L::COUNT]);
+            let output = array.get_mut(index..).unwrap_or_default();
+            for (to, number) in output.iter_mut().step_by(scalars.len()).zip(found) {
+                *to = number;
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn put_bodies<L: Lanes>(
+    here: &SampleScratch,
+    differences: &Option<Differences<'_, L>>,
+    frames: &TreeFrames,
+    states: &mut BodyStates<'_>,
+) {
+    let TreeFrames { bodies, points, .. } = frames;
+    let has_velocities = !(states.velocities.is_empty() && states.angular_velocities.is_empty());
+    for (index, (&body, &point)) in bodies.iter().zip(points).enumerate() {
+        let at = (index, bodies.len());
+        let mut state = frame::<L>(&here.frames, body);
+        let zero = L::all(0.0);
+        let [x, y, z] = state.position;
+        put::<L, _>(states.positions, [x, y, z, zero], at, three);
+        match frames.is_w_first {
+            true => put::<L, _>(states.rotations, state.rotation, at, |[x, y, z, w]| {
+                [w, x, y, z]
+            }),
+            false => put::<L, _>(states.rotations, state.rotation, at, |row| row),
+        }
+        if !has_velocities {
+            continue;
+        }
+        if point != body {
+            state = frame::<L>(&here.frames, point);
+        }
+        if let Some(Differences { ends, per_second }) = differences {
+            let [before, after] = ends.each_ref().map(|end| frame::<L>(&end.frames, point));
+            state.differ(&before, &after, *per_second);
+        }
+        let [x, y, z] = state.velocity;
+        put::<L, _>(states.velocities, [x, y, z, zero], at, three);
+        let [x, y, z] = state.angular_velocity;
+        put::<L, _>(states.angular_velocities, [x, y, z, zero], at, three);
     }
 }

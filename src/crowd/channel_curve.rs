@@ -1,18 +1,19 @@
 //! The curve of one channel of a clip, before it is stored in the tables of a library.
 
+use std::sync::Arc;
+
 use crate::shader::{
     CrowdSpan, FORM_ARC, FORM_CONSTANT, FORM_CUBIC, FORM_CUBIC_KEYS, FORM_KEYS, FORM_LINE,
     FORM_PACKED, POWERS, PolynomialSegment,
 };
-use crate::simd::lanes::{Lanes, MAX_LANES};
 use crate::time::runs::NONE;
-use crate::twin::arc_between::arc_between;
 
 /// One channel before it is stored in the tables: its spans, and the constants of each.
 #[derive(Default)]
 pub(crate) struct ChannelCurve {
     pub(crate) form: u32,
-    pub(crate) spans: Vec<CrowdSpan>,
+    /// Curves with the same key times share them.
+    pub(crate) spans: Arc<Vec<CrowdSpan>>,
     /// The constants of each span; their number depends on the form.
     pub(crate) constants: Vec<[f32; 4]>,
     /// The key at the start of each span, 0 if there is none. Samples at a tick have its bits if the span says that it
@@ -55,7 +56,7 @@ impl ChannelCurve {
 
     /// Adds a span with its constants, as many as the form has.
     pub(crate) fn push(&mut self, span: CrowdSpan, constants: &[[f32; 4]], key: Option<SpanKey>) {
-        self.spans.push(span);
+        Arc::make_mut(&mut self.spans).push(span);
         self.constants.extend_from_slice(constants);
         self.keys.push(key.map_or([0.0; 4], |key| key.value));
         self.key_indices.push(key.map_or(NONE, |key| key.index));
@@ -74,45 +75,5 @@ impl ChannelCurve {
     pub(crate) fn constants_at(&self, span: usize) -> &[[f32; 4]] {
         let each = constants_of(self.form);
         &self.constants[span * each..][..each]
-    }
-}
-
-/// As many arcs between keys as the vector has lanes: their middles and tangents.
-#[inline(always)]
-fn block_between<L: Lanes>(
-    starts: &[[f32; 4]],
-    ends: &[[f32; 4]],
-    [middles, tangents]: [&mut [[f32; 4]]; 2],
-) {
-    let (middle, tangent) = arc_between(L::load_rotations(starts), L::load_rotations(ends));
-    L::store_rotations(middle, middles);
-    L::store_rotations(tangent, tangents);
-}
-
-/// For neighbouring joints: the middle and the tangent of each joint's arc between its two keys.
-#[inline(always)]
-pub(crate) fn arcs_between<L: Lanes>(
-    starts: &[[f32; 4]],
-    ends: &[[f32; 4]],
-    [middles, tangents]: [&mut [[f32; 4]]; 2],
-) {
-    let whole = middles.len() / L::COUNT * L::COUNT;
-    for first in (0..whole).step_by(L::COUNT) {
-        let joints = first..first + L::COUNT;
-        let found = [&mut middles[joints.clone()], &mut tangents[joints.clone()]];
-        block_between::<L>(&starts[joints.clone()], &ends[joints], found);
-    }
-    let rest = middles.len() - whole;
-    if rest > 0 {
-        // The unused lanes of the last vector get arcs that are discarded.
-        let mut keys = [[[0.0; 4]; MAX_LANES]; 2];
-        keys[0][..rest].copy_from_slice(&starts[whole..][..rest]);
-        keys[1][..rest].copy_from_slice(&ends[whole..][..rest]);
-        let mut found = [[[0.0; 4]; MAX_LANES]; 2];
-        let [of_middles, of_tangents] = &mut found;
-        let arcs = [&mut of_middles[..L::COUNT], &mut of_tangents[..L::COUNT]];
-        block_between::<L>(&keys[0][..L::COUNT], &keys[1][..L::COUNT], arcs);
-        middles[whole..].copy_from_slice(&of_middles[..rest]);
-        tangents[whole..].copy_from_slice(&of_tangents[..rest]);
     }
 }

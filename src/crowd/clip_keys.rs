@@ -5,14 +5,13 @@
 
 use glam::Vec4;
 
-use crate::crowd::channel_curve::{ChannelCurve, arcs_between};
+use crate::crowd::channel_curve::ChannelCurve;
 use crate::math::canonical::canonical;
 use crate::math::quaternion::{dot, unit};
 use crate::shader::{
     CrowdChannel, CrowdSpan, FORM_ARC, FORM_ARC_KEYS, FORM_CUBIC, FORM_CUBIC_KEYS, FORM_KEYS,
     FORM_LINE, FORM_PACKED, ON_KEY, PACKED_STEP,
 };
-use crate::simd::lanes::Lanes;
 use crate::twin::arc_between::arc_between;
 use crate::twin::crowd_compact::line_between;
 use crate::twin::functions::cubic;
@@ -130,7 +129,7 @@ fn keys_of_lines(curve: &ChannelCurve) -> Option<(u32, Vec<[f32; 4]>)> {
 
 /// The key at the end of a span. The last span is constant: its key is at both ends.
 #[inline(always)]
-fn next(index: usize, count: usize) -> usize {
+pub(super) fn next(index: usize, count: usize) -> usize {
     (index + 1).min(count - 1)
 }
 
@@ -236,23 +235,17 @@ impl<'a> KeyRows<'a> {
         }
     }
 
-    /// The arcs from the keys at the start of a span to those at its end. `keys` is memory for both.
+    /// The arc in a span, of the first of the channels: its middle and its tangent.
     #[inline(always)]
-    pub(crate) fn arcs<L: Lanes>(
-        &self,
-        span: u32,
-        [starts, ends]: [&mut [[f32; 4]]; 2],
-        arcs: [&mut [[f32; 4]]; 2],
-    ) {
-        let end = next(span as usize, self.rows) as u32;
-        if self.form == FORM_PACKED {
-            self.copy(span, starts);
-            self.copy(end, ends);
-            arcs_between::<L>(starts, ends, arcs);
-        } else {
-            let row = |span: u32| &self.cells[self.first + span as usize * self.stride..];
-            arcs_between::<L>(row(span), row(end), arcs);
+    pub(crate) fn arc(&self, span: u32) -> [[f32; 4]; 2] {
+        let mut keys = [[[0.0; 4]]; 2];
+        let ends = [span, next(span as usize, self.rows) as u32];
+        for (key, span) in keys.iter_mut().zip(ends) {
+            self.copy(span, key);
         }
+        let [[start], [end]] = keys;
+        let (middle, tangent) = arc_between(start, end);
+        [middle, tangent]
     }
 
     /// The line in a span: its middle and its rise.

@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, HashMap};
 use std::ops::Range;
+use std::sync::Arc;
 
 use bytemuck::Zeroable as _;
 use glam::Vec3;
@@ -240,10 +241,6 @@ fn curve_of_keys(
     data: &ClipData,
     clock: (FrameRate, FrameStart, u32),
 ) -> Result<Option<ChannelCurve>, CrowdError> {
-    let mut curve = ChannelCurve {
-        form: FORM_KEYS,
-        ..ChannelCurve::default()
-    };
     let are_listed = |group: &Prepared| group.segments.are_arcs_listed;
     if !data.groups.iter().all(are_listed) {
         return Ok(None);
@@ -251,8 +248,7 @@ fn curve_of_keys(
     let whole = TrackCopy::of_track(0..0);
     let parts = data.parts_in(0, &whole);
     let room = parts.map(|it| it.part.spans.len() + 2).sum();
-    curve.spans.reserve(room);
-    curve.constants.reserve(room);
+    let (mut spans, mut constants) = (Vec::with_capacity(room), Vec::with_capacity(room));
     let mut are_keys = true;
     // The key at the end of the span before.
     let mut end: Option<[f32; 4]> = None;
@@ -278,11 +274,16 @@ fn curve_of_keys(
                 prepared.constants[key + 1]
             }
         });
-        curve.spans.push(span);
-        curve.constants.push(value);
+        spans.push(span);
+        constants.push(value);
     })?;
-    let is_still = curve.spans.len() < 2;
-    Ok((are_keys && !is_still).then_some(curve))
+    let is_still = spans.len() < 2;
+    Ok((are_keys && !is_still).then(|| ChannelCurve {
+        form: FORM_KEYS,
+        spans: Arc::new(spans),
+        constants,
+        ..ChannelCurve::default()
+    }))
 }
 
 /// The curve of a track as its keys, if it has the times of the track before, whose curve consists of all of its keys. The
@@ -305,7 +306,7 @@ fn keys_at_same_times(
         && arc_between(end, end) == (end, [0.0; 4]);
     (is_whole && is_same).then(|| ChannelCurve {
         form: FORM_KEYS,
-        spans: curve.spans.clone(),
+        spans: Arc::clone(&curve.spans),
         constants: keys.to_vec(),
         ..ChannelCurve::default()
     })
@@ -498,7 +499,7 @@ impl ClipTables {
             self.cells.push([0.0; 4]); // kernels use the first cell as 0
         }
         let mut known: HashMap<Vec<u8>, u32> = HashMap::new();
-        let mut last: Option<(&[CrowdSpan], u32)> = None;
+        let mut last: Option<(&Arc<Vec<CrowdSpan>>, u32)> = None;
         // Channels with the same kind, form and time base are stored next to each other.
         let mut sides = BTreeMap::<_, Vec<(usize, &ChannelCurve)>>::new();
         // Compact cubics share a list of weights, too.
@@ -506,10 +507,14 @@ impl ClipTables {
         for (index, curve) in curves.iter().enumerate() {
             let mut base = 0;
             if curve.form != FORM_CONSTANT {
-                let bytes: &[u8] = bytemuck::cast_slice(&curve.spans);
+                let bytes: &[u8] = bytemuck::cast_slice(curve.spans.as_slice());
+                let are_same = |spans: &Arc<Vec<CrowdSpan>>| {
+                    Arc::ptr_eq(spans, &curve.spans)
+                        || bytes == bytemuck::cast_slice::<_, u8>(spans.as_slice())
+                };
                 base = match last {
                     // Usually all curves of a clip have the same spans, so they are stored once.
-                    Some((spans, base)) if bytes == bytemuck::cast_slice::<_, u8>(spans) => base,
+                    Some((spans, base)) if are_same(spans) => base,
                     _ => *known.entry(bytes.to_vec()).or_insert_with(|| {
                         self.push_base(&curve.spans);
                         (self.bases.len() - 1 - first_base) as u32
@@ -548,9 +553,10 @@ impl ClipTables {
             }
             let mut lay_out = |column: fn(&ChannelCurve) -> &[[f32; 4]]| {
                 let first = self.cells.len();
-                for row in 0..column(members[0].1).len() {
-                    let cells = members.iter().map(|(_, curve)| column(curve)[row]);
-                    self.cells.extend(cells);
+                let columns: Vec<_> = members.iter().map(|(_, curve)| column(curve)).collect();
+                self.cells.reserve(columns.len() * columns[0].len());
+                for row in 0..columns[0].len() {
+                    self.cells.extend(columns.iter().map(|column| column[row]));
                 }
                 first
             };
@@ -651,7 +657,7 @@ impl ClipTables {
         let has_keys = spans.iter().any(|span| span.start & ON_KEY != 0);
         let mut curve = ChannelCurve {
             form: whole_form(form),
-            spans: spans.to_vec(),
+            spans: Arc::new(spans.to_vec()),
             ..ChannelCurve::default()
         };
         for row in 0..spans.len() {

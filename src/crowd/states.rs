@@ -9,21 +9,24 @@ use rayon::prelude::*;
 
 use crate::crowd::channel_curve::constants_of;
 use crate::crowd::clip_keys::{KeyRows, keeps_keys};
-use crate::crowd::clip_tables::{ClipTables, arcs, runs_of};
+use crate::crowd::clip_tables::{ClipTables, runs_of};
+use crate::crowd::lane_states::{Group, put_differences, put_states, walk};
 use crate::crowd_error::CrowdError;
 use crate::engine::Engine;
 use crate::math::canonical::canonical;
 use crate::math::quaternion::{cross3, dot, product, scaled, sum};
 use crate::memory::reserved;
 use crate::shader::{
-    CHANNELS, CrowdBase, CrowdChannel, CrowdClip, CrowdLink, CrowdPosition, CrowdSpan, FORM_ARC,
-    FORM_CONSTANT, FORM_CUBIC, FORM_KEYS, FORM_LINE, FORM_PACKED, FORM_POLYNOMIAL, ON_KEY, POWERS,
-    TICKS, TRANSLATION,
+    ArcSegment, CHANNELS, CrowdBase, CrowdChannel, CrowdClip, CrowdLink, CrowdPosition, CrowdSpan,
+    FORM_ARC, FORM_CONSTANT, FORM_CUBIC, FORM_KEYS, FORM_LINE, FORM_PACKED, FORM_POLYNOMIAL,
+    ON_KEY, POWERS, TICKS, TRANSLATION,
 };
+use crate::simd::cache_line::request;
 use crate::simd::dispatch::{InLanes, in_lanes_of};
-use crate::simd::lanes::{Lanes, Number};
+use crate::simd::lanes::{Choice, Lanes, MAX_LANES, Number};
 use crate::threads::stop;
-use crate::twin::arc_tangent::{arc_tangent, flushed, reciprocal, root};
+use crate::twin::Evaluate as _;
+use crate::twin::arc_tangent::{acute_angle, flushed, reciprocal, root};
 use crate::twin::crowd_layers::sampled;
 use crate::twin::crowd_times::position_at;
 use crate::twin::quaternion::rotated;
@@ -521,6 +524,30 @@ pub(super) fn check_steps(length: usize, needed: usize) -> Result<(), CrowdError
     }
 }
 
+/// Where the instances of a group are at one end of their steps.
+#[inline(always)]
+pub(super) fn ends_of_steps(
+    instances: &[(u32, u32)],
+    steps: &[FrameStep],
+    side: usize,
+) -> [(u32, u32); MAX_LANES] {
+    let mut at = [(0, 0); MAX_LANES];
+    for (at, (&(clip, _), step)) in at.iter_mut().zip(instances.iter().zip(steps)) {
+        *at = (clip, step.ticks[side]);
+    }
+    at
+}
+
+/// How many steps of each instance of a group are in a second.
+#[inline(always)]
+pub(super) fn steps_per_second(steps: &[FrameStep]) -> [f32; MAX_LANES] {
+    let mut per_second = [0.0; MAX_LANES];
+    for (per_second, step) in per_second.iter_mut().zip(steps) {
+        *per_second = step.per_second;
+    }
+    per_second
+}
+
 /// Refuses instances of clips that do not exist.
 pub(super) fn check_clips(count: usize, at: &[(u32, u32)]) -> Result<(), CrowdError> {
     match at.iter().find(|(clip, _)| *clip as usize >= count) {
@@ -562,45 +589,75 @@ impl<'a> MotionStates<'a> {
 #[derive(Default)]
 struct StateScratch {
     pose: PoseScratch,
-    rotations: Vec<[f32; 4]>,
-    /// The states of instances, and those at both ends of their steps.
-    here: StateRows,
-    ends: [StateRows; 2],
-    walk: Vec<f32>,
+    /// The numbers of the states of a group of instances.
+    numbers: Vec<f32>,
+    /// Those at both ends of their steps.
+    ends: [Vec<f32>; 2],
 }
 
-/// Scratch memory for one pose.
+/// Scratch memory for poses.
 #[derive(Default)]
 pub(super) struct PoseScratch {
-    /// The clip of the previous pose, and the positions of its time bases.
-    clip: Option<u32>,
-    positions: Vec<CrowdPosition>,
-    /// The keys at the start and at the end of the span of each joint.
-    keys: [Vec<[f32; 4]>; 2],
-    /// The middles and tangents of the arcs between these, and the angular velocities along them. Vectors may reach beyond
-    /// the last joint.
-    arcs: [Vec<[f32; 4]>; 2],
-    rates: Vec<[f32; 4]>,
+    /// Where the ticks of the poses are, and where those of the poses before were.
+    pub(super) located: LocatedTicks,
+    before: LocatedTicks,
 }
 
-impl PoseScratch {
-    pub(super) fn resize<L: Lanes>(&mut self, joints: usize) {
-        for memory in &mut self.keys {
-            memory.resize(joints, [0.0; 4]);
+/// Where ticks are in the time bases of their clips.
+#[derive(Default)]
+pub(super) struct LocatedTicks {
+    clips: Vec<u32>,
+    /// The first position of each tick.
+    firsts: Vec<usize>,
+    positions: Vec<BasePosition>,
+}
+
+impl LocatedTicks {
+    fn clear(&mut self) {
+        self.clips.clear();
+        self.firsts.clear();
+        self.positions.clear();
+    }
+
+    /// The positions of a tick in the time bases of its clip.
+    #[inline(always)]
+    pub(super) fn of(&self, index: usize) -> &[BasePosition] {
+        let end = self.firsts.get(index + 1).copied();
+        &self.positions[self.firsts[index]..end.unwrap_or(self.positions.len())]
+    }
+
+    /// The positions of a tick of this clip that is probably near, of the poses before: the last one, which is the one
+    /// before in a window, or the one with this index, which is at the other end of a step.
+    #[inline(always)]
+    fn near(&self, clip: u32, index: usize) -> Option<&[BasePosition]> {
+        if index == 0 && self.clips.last() == Some(&clip) {
+            return Some(self.of(self.clips.len() - 1));
         }
-        for memory in self.arcs.iter_mut().chain([&mut self.rates]) {
-            memory.resize(joints + L::COUNT, [0.0; 4]);
-        }
+        (self.clips.get(index) == Some(&clip)).then(|| self.of(index))
     }
 }
 
-/// The states of as many instances as a vector has lanes, `[joint][instance]`. Positions and velocities end in a 0.
-#[derive(Default)]
-pub(super) struct StateRows {
-    pub(super) rotations: Vec<[f32; 4]>,
-    pub(super) positions: Vec<[f32; 4]>,
-    pub(super) velocities: Vec<[f32; 4]>,
-    pub(super) angular_velocities: Vec<[f32; 4]>,
+/// Where a tick is in a time base.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct BasePosition {
+    /// Its span, marked if the tick is that of the span's key.
+    pub(super) span: u32,
+    /// The span along which poses move there: at the last key the one that ends there.
+    pub(super) along: u32,
+    /// The parameters in the two spans.
+    pub(super) parameter: f32,
+    pub(super) parameter_along: f32,
+    /// The rate of the second one, per second.
+    pub(super) rate: f32,
+}
+
+impl BasePosition {
+    fn stands(self) -> CrowdPosition {
+        CrowdPosition {
+            span: self.span,
+            parameter: self.parameter,
+        }
+    }
 }
 
 /// A joint in its parent's frame, or in the world.
@@ -614,101 +671,6 @@ pub(super) struct Joint<N> {
 
 /// The numbers of a joint's state.
 pub(super) const JOINT_NUMBERS: usize = 13;
-
-impl StateRows {
-    pub(super) fn resize(&mut self, count: usize) {
-        for rows in [
-            &mut self.rotations,
-            &mut self.positions,
-            &mut self.velocities,
-            &mut self.angular_velocities,
-        ] {
-            rows.resize(count, [0.0; 4]);
-        }
-    }
-
-    /// Converts the states from the parents' frames to the world. `memory` has room for the numbers of all joints, each as
-    /// a vector: as many instances are walked together.
-    #[inline(always)]
-    fn walk<L: Lanes>(&mut self, links: &[CrowdLink], moves: bool, memory: &mut [f32]) {
-        let each = JOINT_NUMBERS * L::COUNT;
-        let joints = self.rotations.len() / L::COUNT;
-        for (joint, numbers) in memory.chunks_exact_mut(each).take(joints).enumerate() {
-            self.joint::<L>(joint, moves).store(numbers);
-        }
-        for link in links {
-            let [parent, child] = [link.parent, link.joint].map(|joint| joint as usize * each);
-            let above = Joint::<L>::load(&memory[parent..parent + each]);
-            let numbers = &mut memory[child..child + each];
-            Joint::load(numbers).hung_on(&above, moves).store(numbers);
-        }
-        for (joint, numbers) in memory.chunks_exact(each).take(joints).enumerate() {
-            self.put::<L>(joint, &Joint::load(numbers), moves);
-        }
-    }
-
-    #[inline(always)]
-    pub(super) fn joint<L: Lanes>(&self, joint: usize, moves: bool) -> Joint<L> {
-        let at = joint * L::COUNT;
-        let zero = [L::all(0.0), L::all(0.0), L::all(0.0)];
-        let [x, y, z, _] = L::load_rotations(&self.positions[at..]);
-        let mut found = Joint {
-            rotation: L::load_rotations(&self.rotations[at..]),
-            position: [x, y, z],
-            velocity: zero,
-            angular_velocity: zero,
-        };
-        if moves {
-            let [x, y, z, _] = L::load_rotations(&self.velocities[at..]);
-            found.velocity = [x, y, z];
-            let [x, y, z, _] = L::load_rotations(&self.angular_velocities[at..]);
-            found.angular_velocity = [x, y, z];
-        }
-        found
-    }
-
-    #[inline(always)]
-    pub(super) fn put<L: Lanes>(&mut self, joint: usize, state: &Joint<L>, moves: bool) {
-        let at = joint * L::COUNT..(joint + 1) * L::COUNT;
-        let zero = L::all(0.0);
-        L::store_rotations(state.rotation, &mut self.rotations[at.clone()]);
-        let [x, y, z] = state.position;
-        L::store_rotations([x, y, z, zero], &mut self.positions[at.clone()]);
-        if moves {
-            let [x, y, z] = state.velocity;
-            L::store_rotations([x, y, z, zero], &mut self.velocities[at.clone()]);
-            let [x, y, z] = state.angular_velocity;
-            L::store_rotations([x, y, z, zero], &mut self.angular_velocities[at]);
-        }
-    }
-
-    /// Sets the velocities of an instance to the difference of two states, divided by the time between them,
-    /// `1 / per_second`.
-    #[inline(always)]
-    pub(super) fn differ(&mut self, at: usize, ends: [&Self; 2], per_second: f32) {
-        let [before, after] = ends.map(|end| end.state(at, false));
-        let mut state = self.state(at, false);
-        state.differ(&before, &after, per_second);
-        let ([x, y, z], [a, b, c]) = (state.velocity, state.angular_velocity);
-        (self.velocities[at], self.angular_velocities[at]) = ([x, y, z, 0.0], [a, b, c, 0.0]);
-    }
-
-    /// One state; its velocities are 0 unless it moves.
-    #[inline(always)]
-    fn state(&self, at: usize, moves: bool) -> Joint<f32> {
-        let three = |[x, y, z, _]: [f32; 4]| [x, y, z];
-        let velocity = |rows: &[[f32; 4]]| match moves {
-            true => three(rows[at]),
-            false => [0.0; 3],
-        };
-        Joint {
-            rotation: self.rotations[at],
-            position: three(self.positions[at]),
-            velocity: velocity(&self.velocities),
-            angular_velocity: velocity(&self.angular_velocities),
-        }
-    }
-}
 
 impl<L: Lanes> Joint<L> {
     #[inline(always)]
@@ -751,22 +713,25 @@ impl<L: Lanes> Joint<L> {
     }
 }
 
-impl Joint<f32> {
+impl<N: Choice> Joint<N> {
     /// Sets the velocities to the difference of two states, divided by the time between them, `1 / per_second`.
     #[inline(always)]
-    fn differ(&mut self, before: &Self, after: &Self, per_second: f32) {
-        let [x, y, z] = before.position.map(|coordinate| -coordinate);
-        self.velocity = scaled(sum(after.position, [x, y, z]), per_second).map(canonical);
+    pub(super) fn differ(&mut self, before: &Self, after: &Self, per_second: N) {
+        let [x, y, z] = before.position;
+        let moved = sum(after.position, [-x, -y, -z]);
+        self.velocity = canonical3(scaled(moved, per_second));
         let [x, y, z, w] = before.rotation;
-        let [x, y, z, w] = product(after.rotation, [-x, -y, -z, w]).map(flushed);
+        let [x, y, z, w] = product(after.rotation, [-x, -y, -z, w]);
+        let [x, y, z, w] = [flushed(x), flushed(y), flushed(z), flushed(w)];
+        let zero = N::all(0.0);
         let sine = root(x * x + y * y + z * z);
+        let is_long = !zero.at_most(w);
+        let cosine = N::choose(is_long, -w, w);
         // The shorter arc, by the rotation vector's length; 0 if the angle is.
-        let scale = match sine == 0.0 {
-            true => 0.0,
-            false => 2.0 * arc_tangent(sine, w.abs()) * reciprocal(sine),
-        };
-        let scale = if w < 0.0 { -scale } else { scale };
-        self.angular_velocity = scaled([x, y, z], scale * per_second).map(canonical);
+        let scale = N::all(2.0) * acute_angle(sine, cosine) * reciprocal(sine);
+        let scale = N::choose(sine.equals(zero), zero, scale);
+        let scale = N::choose(is_long, -scale, scale);
+        self.angular_velocity = canonical3(scaled([x, y, z], scale * per_second));
     }
 }
 
@@ -779,7 +744,7 @@ pub(super) fn canonical3<N: Number>([x, y, z]: [N; 3]) -> [N; 3] {
 impl<N: Number> Joint<N> {
     /// The joint's state in the world, of that in its parent's frame.
     #[inline(always)]
-    fn hung_on(self, parent: &Self, moves: bool) -> Self {
+    pub(super) fn hung_on(self, parent: &Self, moves: bool) -> Self {
         let arm = rotated(parent.rotation, self.position);
         let rotation = product(parent.rotation, self.rotation);
         // One step of Newton's: rounding does not add up along the skeleton.
@@ -803,26 +768,6 @@ impl<N: Number> Joint<N> {
             found.angular_velocity = canonical3(sum(parent.angular_velocity, relative));
         }
         found
-    }
-}
-
-/// The angular velocities along arcs of neighbouring joints, about the parents' axes: twice the tangent over the middle,
-/// times the parameter's rate.
-#[inline(always)]
-fn rates_of_arcs<L: Lanes>(
-    joints: Range<usize>,
-    [middles, tangents]: [&[[f32; 4]]; 2],
-    rate: f32,
-    rates: &mut [[f32; 4]],
-) {
-    let factor = L::all(2.0 * rate);
-    for first in joints.step_by(L::COUNT) {
-        let [x, y, z, w] = L::load_rotations(&middles[first..]);
-        let slope = L::load_rotations(&tangents[first..]);
-        let [x, y, z, _] = product(slope, [-x, -y, -z, w]);
-        let [x, y, z] = canonical3(scaled([x, y, z], factor));
-        let rates = &mut rates[first..first + L::COUNT];
-        L::store_rotations([x, y, z, L::all(0.0)], rates);
     }
 }
 
@@ -856,7 +801,7 @@ impl InLanes for StatesTask<'_, '_> {
         let states = &mut self.states;
         let moves = !(states.velocities.is_empty() && states.angular_velocities.is_empty());
         let in_world = !(states.positions.is_empty() && states.world_rotations.is_empty());
-        let values_of_pose = match (moves && self.steps.is_none(), in_world) {
+        let values = match (moves && self.steps.is_none(), in_world) {
             (true, _) => PoseValues::Velocities,
             (false, true) => PoseValues::World,
             (false, false) => PoseValues::Rotations,
@@ -868,93 +813,43 @@ impl InLanes for StatesTask<'_, '_> {
         };
         let StateScratch {
             pose,
-            rotations,
-            here,
+            numbers,
             ends,
-            walk,
         } = &mut *self.memory;
-        rotations.resize(joints, [0.0; 4]);
-        here.resize(joints * L::COUNT);
-        if self.steps.is_some() {
-            for end in &mut *ends {
-                end.resize(joints * L::COUNT);
-            }
-        }
-        walk.resize(joints * JOINT_NUMBERS * L::COUNT, 0.0);
-        pose.resize::<L>(joints);
-        let is_posed = values_of_pose > PoseValues::Rotations || !states.rotations.is_empty();
+        numbers.resize(joints * JOINT_NUMBERS * L::COUNT, 0.0);
+        let steps = self.steps.filter(|_| moves);
+        let is_posed = values > PoseValues::Rotations || !states.rotations.is_empty();
         for (group, instances) in self.at.chunks(L::COUNT).enumerate() {
-            let first = group * L::COUNT;
-            for (lane, &(clip, tick)) in instances.iter().enumerate() {
-                let at = (first + lane) * joints..(first + lane + 1) * joints;
-                if is_posed {
-                    let local = match states.rotations.get_mut(at) {
-                        Some(rotations) => rotations,
-                        None => &mut rotations[..],
-                    };
-                    let rows = (&mut *here, lane);
-                    poses.compute::<L>((clip, tick), values_of_pose, pose, local, rows);
-                }
-                if let (Some(steps), true) = (self.steps, moves) {
-                    for (end, tick) in ends.iter_mut().zip(steps[first + lane].ticks) {
-                        let values = PoseValues::World;
-                        poses.compute::<L>((clip, tick), values, pose, rotations, (end, lane));
-                    }
+            let mut outputs = states.split_off(instances.len() * joints);
+            if is_posed {
+                poses.locate(instances, pose);
+                let group = Group {
+                    poses,
+                    at: instances,
+                    located: &pose.located,
+                };
+                group.pose::<L>(values, outputs.rotations, numbers);
+                if values > PoseValues::Rotations {
+                    walk::<L>(&tables.links, values, numbers);
+                    put_states::<L>(values, joints, numbers, &mut outputs);
                 }
             }
-            if values_of_pose > PoseValues::Rotations {
-                let moves = values_of_pose == PoseValues::Velocities;
-                here.walk::<L>(&tables.links, moves, walk);
+            let Some(steps) = steps else { continue };
+            let steps = &steps[group * L::COUNT..][..instances.len()];
+            for (side, end) in ends.iter_mut().enumerate() {
+                let at = ends_of_steps(instances, steps, side);
+                let at = &at[..instances.len()];
+                poses.locate(at, pose);
+                let group = Group {
+                    poses,
+                    at,
+                    located: &pose.located,
+                };
+                end.resize(numbers.len(), 0.0);
+                group.pose::<L>(PoseValues::World, &mut [], end);
+                walk::<L>(&tables.links, PoseValues::World, end);
             }
-            if let (Some(steps), true) = (self.steps, moves) {
-                for end in &mut *ends {
-                    end.walk::<L>(&tables.links, false, walk);
-                }
-                let [before, after] = &*ends;
-                for joint in 0..joints {
-                    for (lane, step) in steps[first..][..instances.len()].iter().enumerate() {
-                        let at = joint * L::COUNT + lane;
-                        here.differ(at, [before, after], step.per_second);
-                    }
-                }
-            }
-            for lane in 0..instances.len() {
-                let at = (first + lane) * joints..(first + lane + 1) * joints;
-                let positions = states.positions.get_mut(at.clone());
-                put(
-                    positions,
-                    &here.positions,
-                    (lane, L::COUNT),
-                    |[x, y, z, _]| [x, y, z],
-                );
-                let rotations = states.world_rotations.get_mut(at.clone());
-                put(rotations, &here.rotations, (lane, L::COUNT), |row| row);
-                let velocities = states.velocities.get_mut(at.clone());
-                put(
-                    velocities,
-                    &here.velocities,
-                    (lane, L::COUNT),
-                    |[x, y, z, _]| [x, y, z],
-                );
-                let rates = states.angular_velocities.get_mut(at);
-                let of_rates = &here.angular_velocities;
-                put(rates, of_rates, (lane, L::COUNT), |[x, y, z, _]| [x, y, z]);
-            }
-        }
-    }
-}
-
-/// Stores the values of an instance's joints in an array that is not left out.
-#[inline(always)]
-fn put<T>(
-    array: Option<&mut [T]>,
-    rows: &[[f32; 4]],
-    (lane, lanes): (usize, usize),
-    of: fn([f32; 4]) -> T,
-) {
-    if let Some(array) = array {
-        for (value, row) in array.iter_mut().zip(rows[lane..].iter().step_by(lanes)) {
-            *value = of(*row);
+            put_differences::<L>(&steps_per_second(steps), joints, ends, &mut outputs);
         }
     }
 }
@@ -967,91 +862,138 @@ pub(super) struct Poses<'a> {
     pub(super) cells: &'a [[f32; 4]],
 }
 
-impl Poses<'_> {
-    /// Computes the pose of a clip at a tick: rotations in the parents' frames to `local`, and all states in the parents'
-    /// frames to the rows of a lane.
+impl<'a> Poses<'a> {
+    /// The time bases of a clip.
     #[inline(always)]
-    pub(super) fn compute<L: Lanes>(
-        &self,
-        (clip, tick): (u32, u32),
-        values_of_pose: PoseValues,
-        scratch: &mut PoseScratch,
-        local: &mut [[f32; 4]],
-        (rows, lane): (&mut StateRows, usize),
-    ) {
-        let Self {
-            tables,
-            spans,
-            cells,
-        } = *self;
-        let clip_entry = &tables.clips[clip as usize];
-        let tick = tick.min(clip_entry.period);
-        let bases = &tables.bases[clip_entry.first_base as usize..][..clip_entry.bases as usize];
-        let positions = &mut scratch.positions;
-        if scratch.clip != Some(clip) {
-            scratch.clip = Some(clip);
-            positions.clear();
-            // As if keys were at even times.
-            positions.extend(bases.iter().map(|base| CrowdPosition {
-                span: spans_in(base, tick.into(), clip_entry.period) as u32,
-                parameter: 0.0,
-            }));
-        }
-        // The previous pose was often of the same clip, about a frame earlier or later (in a window, or at the other
-        // end of a step), so the search starts at its positions.
-        for (base, position) in bases.iter().zip(&mut *positions) {
-            let guess = position.span & TICKS;
-            *position = guessed_position(base, spans, (tick, clip_entry.period), guess);
-        }
-        let each = tables.joints * CHANNELS as usize;
-        let channels = &tables.channels[clip as usize * each..][..each];
-        let moment = ClipMoment {
-            bases,
-            spans,
-            cells,
-            positions,
-            tick,
-            per_second: tables.ticks_per_second as f32,
-        };
-        let moves = values_of_pose == PoseValues::Velocities;
-        for run in &tables.runs[clip as usize] {
-            let joints = run.start as usize..run.end as usize;
-            let values = &mut local[joints.clone()];
-            let channel = &channels[joints.start * CHANNELS as usize];
-            if !keeps_keys(channel.form_and_base >> 24) {
-                moment.rotations::<L>(channels, run.clone(), values);
-                continue;
-            }
-            let keys = scratch
-                .keys
-                .each_mut()
-                .map(|keys| &mut keys[joints.clone()]);
-            let arcs = (scratch.arcs.each_mut()).map(|arcs| &mut arcs[joints.clone()]);
-            moment.rotations_of_keys::<L>(channel, moves, keys, arcs, values);
-            if moves {
-                let (.., rate) = moment.along(channel);
-                let [middles, tangents] = &scratch.arcs;
-                rates_of_arcs::<L>(joints, [middles, tangents], rate, &mut scratch.rates);
-            }
-        }
-        if values_of_pose == PoseValues::Rotations {
-            return;
-        }
-        for (joint, &rotation) in local.iter().enumerate() {
-            let [rotates, moved] = [
-                &channels[joint * 3],
-                &channels[joint * 3 + TRANSLATION as usize],
-            ];
-            let row = joint * L::COUNT + lane;
-            let [x, y, z, _] = moment.value(moved);
-            (rows.rotations[row], rows.positions[row]) = (rotation, [x, y, z, 0.0]);
-            if moves {
-                rows.angular_velocities[row] = match keeps_keys(rotates.form_and_base >> 24) {
-                    true => scratch.rates[joint],
-                    false => moment.angular_velocity(rotates),
+    pub(super) fn bases(&self, clip: u32) -> &'a [CrowdBase] {
+        let clip = &self.tables.clips[clip as usize];
+        &self.tables.bases[clip.first_base as usize..][..clip.bases as usize]
+    }
+
+    /// The channels of a clip.
+    #[inline(always)]
+    pub(super) fn channels(&self, clip: u32) -> &'a [CrowdChannel] {
+        let each = self.tables.joints * CHANNELS as usize;
+        &self.tables.channels[clip as usize * each..][..each]
+    }
+
+    /// Finds where ticks are in the time bases of their clips. What is read of the tables is requested for all of them before
+    /// the first is used, because each wait for memory takes longer than a pose.
+    #[inline(always)]
+    pub(super) fn locate(&self, at: &[(u32, u32)], scratch: &mut PoseScratch) {
+        let PoseScratch {
+            located, before, ..
+        } = scratch;
+        std::mem::swap(located, before);
+        located.clear();
+        let has_several = at.len() > 1;
+        for (index, &(clip, tick)) in at.iter().enumerate() {
+            located.clips.push(clip);
+            located.firsts.push(located.positions.len());
+            let period = self.tables.clips[clip as usize].period;
+            let is_like_previous = index > 0 && at[index - 1].0 == clip;
+            let near = before.near(clip, index);
+            for (base, of_base) in self.bases(clip).iter().enumerate() {
+                let span = match near {
+                    _ if is_like_previous => 0,
+                    Some(near) => near[base].span & TICKS,
+                    // As if keys were at even times.
+                    None => spans_in(of_base, tick.min(period).into(), period) as u32,
                 };
-                rows.velocities[row] = moment.velocity(moved);
+                let guess = BasePosition {
+                    span,
+                    ..BasePosition::default()
+                };
+                located.positions.push(guess);
+                if has_several && !is_like_previous {
+                    let base_spans =
+                        &self.spans[of_base.first as usize..][..of_base.count as usize];
+                    let (first, end) = neighbours(span as usize, base_spans.len());
+                    request(&base_spans[first..end]);
+                }
             }
+            if has_several {
+                request(self.channels(clip));
+            }
+        }
+        for (index, &(clip, tick)) in at.iter().enumerate() {
+            let period = self.tables.clips[clip as usize].period;
+            let first = located.firsts[index];
+            let is_like_previous = index > 0 && at[index - 1].0 == clip;
+            let guesses = match is_like_previous {
+                true => located.firsts[index - 1],
+                false => first,
+            };
+            for (base, of_base) in self.bases(clip).iter().enumerate() {
+                let guess = located.positions[guesses + base].span & TICKS;
+                located.positions[first + base] =
+                    self.position(of_base, (tick.min(period), period), guess);
+            }
+            if has_several {
+                self.request_cells(clip, &located.positions[first..]);
+            }
+        }
+    }
+
+    /// Where a tick is in a time base.
+    #[inline(always)]
+    fn position(&self, base: &CrowdBase, (tick, period): (u32, u32), guess: u32) -> BasePosition {
+        let stands = guessed_position(base, self.spans, (tick, period), guess);
+        let mut along = stands.span & TICKS;
+        let mut span = &self.spans[(base.first + along) as usize];
+        let mut parameter_along = stands.parameter;
+        let is_end = span.scale == 0.0 && span.start & TICKS == tick;
+        if is_end && along > 0 {
+            along -= 1;
+            span = &self.spans[(base.first + along) as usize];
+            let distance = (tick as i32).wrapping_sub(span.whole) as f32;
+            parameter_along = distance * span.scale + span.offset;
+        }
+        BasePosition {
+            span: stands.span,
+            along,
+            parameter: stands.parameter,
+            parameter_along,
+            rate: span.scale * self.tables.ticks_per_second as f32,
+        }
+    }
+
+    /// Requests the cells that a pose of a clip reads at these positions.
+    #[inline(always)]
+    fn request_cells(&self, clip: u32, positions: &[BasePosition]) {
+        let channels = self.channels(clip);
+        let request_of = |channel: &CrowdChannel, count: usize| {
+            let base = (channel.form_and_base & 0x00ff_ffff) as usize;
+            let (first, span) = (channel.first as usize, positions[base].along as usize);
+            let form = channel.form_and_base >> 24;
+            let row = match form {
+                FORM_CONSTANT => 0,
+                _ => channel.count as usize,
+            };
+            let cells = match form {
+                FORM_CONSTANT => first..first + 1,
+                FORM_PACKED => {
+                    let first = first + span * row;
+                    first / 2..(first + row + count) / 2 + 1
+                }
+                _ if keeps_keys(form) => first + span * row..first + (span + 1) * row + count,
+                _ => {
+                    let constants = constants_of(form);
+                    let first = first + span * row * constants;
+                    first..first + row * (constants - 1) + count
+                }
+            };
+            request(self.cells.get(cells).unwrap_or_default());
+        };
+        for run in &self.tables.runs[clip as usize] {
+            request_of(&channels[(run.start * CHANNELS) as usize], run.len());
+        }
+        for channel in channels
+            .iter()
+            .skip(TRANSLATION as usize)
+            .step_by(CHANNELS as usize)
+        {
+            request_of(channel, 1);
         }
     }
 }
@@ -1061,6 +1003,13 @@ impl Poses<'_> {
 fn spans_in(base: &CrowdBase, ticks: i64, period: u32) -> i64 {
     let count = i64::from(base.count);
     (ticks * (count - 1) / i64::from(period).max(1)).min(count - 1)
+}
+
+/// The spans around one that are compared together: the first, and the one behind the last.
+#[inline(always)]
+fn neighbours(index: usize, count: usize) -> (usize, usize) {
+    let first = (index.saturating_sub(NEIGHBOURS / 2)).min(count.saturating_sub(NEIGHBOURS));
+    (first, count.min(first + NEIGHBOURS))
 }
 
 /// The position of a tick in a time base, as [`position_at`] computes it. Most keys are at even times, or intervals are
@@ -1082,8 +1031,8 @@ fn guessed_position(
         return position_in(base, spans, tick, index);
     }
     for _ in 0..GUESSES {
-        let first = (index.saturating_sub(NEIGHBOURS / 2)).min(count.saturating_sub(NEIGHBOURS));
-        let neighbours = &base_spans[first..count.min(first + NEIGHBOURS)];
+        let (first, end) = neighbours(index, count);
+        let neighbours = &base_spans[first..end];
         // All are compared, because branches could not be predicted.
         let is_begun = |span: &CrowdSpan| usize::from(span.start & TICKS <= tick);
         let begun: usize = neighbours.iter().map(is_begun).sum();
@@ -1112,76 +1061,53 @@ fn position_in(base: &CrowdBase, spans: &[CrowdSpan], tick: u32, index: usize) -
 }
 
 /// A moment of a clip.
-struct ClipMoment<'a> {
-    bases: &'a [CrowdBase],
-    spans: &'a [CrowdSpan],
-    cells: &'a [[f32; 4]],
-    positions: &'a [CrowdPosition],
-    tick: u32,
-    per_second: f32,
+#[derive(Clone, Copy, Default)]
+pub(super) struct ClipMoment<'a> {
+    pub(super) bases: &'a [CrowdBase],
+    pub(super) cells: &'a [[f32; 4]],
+    pub(super) positions: &'a [BasePosition],
 }
 
 impl ClipMoment<'_> {
-    /// The rotations of neighbouring joints, as in a crowd with one layer.
+    /// Where the moment is in the time base of a channel.
     #[inline(always)]
-    fn rotations<L: Lanes>(
-        &self,
-        channels: &[CrowdChannel],
-        run: Range<u32>,
-        values: &mut [[f32; 4]],
-    ) {
-        let of = |joint: u32| &channels[(joint * CHANNELS) as usize];
-        let channel = of(run.start);
-        let stands = self.positions[(channel.form_and_base & 0x00ff_ffff) as usize];
-        if channel.form_and_base >> 24 == FORM_ARC && stands.span & ON_KEY == 0 {
-            let middle = (channel.first + stands.span * channel.count * 2) as usize;
-            let tangent = middle + channel.count as usize;
-            let cells = |first: usize| &self.cells[first..first + values.len()];
-            arcs::<L>(cells(middle), cells(tangent), stands.parameter, values);
-            return;
-        }
-        for (joint, value) in run.zip(values) {
-            *value = sampled(self.cells, of(joint), stands);
-        }
+    pub(super) fn position(&self, channel: &CrowdChannel) -> BasePosition {
+        self.positions[(channel.form_and_base & 0x00ff_ffff) as usize]
     }
 
-    /// The rotations of neighbouring joints whose channels have keys, from `channel` on. If the joints move, `arcs`
-    /// are those along which they do.
+    /// The rows of a channel that consists of keys.
     #[inline(always)]
-    fn rotations_of_keys<L: Lanes>(
-        &self,
-        channel: &CrowdChannel,
-        moves: bool,
-        [starts, ends]: [&mut [[f32; 4]]; 2],
-        [middles, tangents]: [&mut [[f32; 4]]; 2],
-        values: &mut [[f32; 4]],
-    ) {
+    pub(super) fn rows(&self, channel: &CrowdChannel) -> KeyRows<'_> {
         let base = (channel.form_and_base & 0x00ff_ffff) as usize;
-        let stands = self.positions[base];
-        let is_on_key = stands.span & ON_KEY != 0;
-        let rows = KeyRows::new(self.cells, channel, self.bases[base].count as usize);
-        let span = stands.span & TICKS;
-        let (along, ..) = self.along(channel);
-        if moves || !is_on_key {
-            let arcs = [&mut *middles, &mut *tangents];
-            rows.arcs::<L>(along, [starts, ends], arcs);
+        KeyRows::new(self.cells, channel, self.bases[base].count as usize)
+    }
+
+    /// A rotation.
+    #[inline(always)]
+    pub(super) fn rotation(&self, channel: &CrowdChannel) -> [f32; 4] {
+        let position = self.position(channel);
+        if !keeps_keys(channel.form_and_base >> 24) {
+            return sampled(self.cells, channel, position.stands());
         }
-        if is_on_key || along != span {
-            rows.copy(span, values);
-        } else {
-            arcs::<L>(middles, tangents, stands.parameter, values);
+        let (span, along) = (position.span & TICKS, position.along);
+        if position.span & ON_KEY != 0 || along != span {
+            let mut key = [[0.0; 4]];
+            self.rows(channel).copy(span, &mut key);
+            return key[0];
         }
+        let [middle, tangent] = self.rows(channel).arc(span);
+        let arc = ArcSegment { middle, tangent };
+        arc.at(position.parameter).to_array().map(canonical)
     }
 
     /// A translation.
     #[inline(always)]
-    fn value(&self, channel: &CrowdChannel) -> [f32; 4] {
-        let base = (channel.form_and_base & 0x00ff_ffff) as usize;
-        let position = self.positions[base];
+    pub(super) fn value(&self, channel: &CrowdChannel) -> [f32; 4] {
+        let position = self.position(channel);
         if channel.form_and_base >> 24 != FORM_LINE {
-            return sampled(self.cells, channel, position);
+            return sampled(self.cells, channel, position.stands());
         }
-        let rows = KeyRows::new(self.cells, channel, self.bases[base].count as usize);
+        let rows = self.rows(channel);
         let span = position.span & TICKS;
         if position.span & ON_KEY != 0 {
             let mut key = [[0.0; 4]];
@@ -1191,35 +1117,24 @@ impl ClipMoment<'_> {
         rows.point(span, position.parameter)
     }
 
-    /// The span of a channel, the parameter in it and the parameter's rate per second. At the last key these are of
-    /// the span that ends there.
+    /// The angular velocity of a rotation about the parent's axes.
     #[inline(always)]
-    fn along(&self, channel: &CrowdChannel) -> (u32, f32, f32) {
-        let base = (channel.form_and_base & 0x00ff_ffff) as usize;
-        let position = self.positions[base];
-        let mut index = position.span & TICKS;
-        let first = self.bases[base].first;
-        let mut span = &self.spans[(first + index) as usize];
-        let mut parameter = position.parameter;
-        let is_end = span.scale == 0.0 && span.start & TICKS == self.tick;
-        if is_end && index > 0 {
-            index -= 1;
-            span = &self.spans[(first + index) as usize];
-            let distance = (self.tick as i32).wrapping_sub(span.whole) as f32;
-            parameter = distance * span.scale + span.offset;
-        }
-        (index, parameter, span.scale * self.per_second)
-    }
-
-    /// The angular velocity of a rotation whose channel has constants, about the parent's axes.
-    #[inline(always)]
-    fn angular_velocity(&self, channel: &CrowdChannel) -> [f32; 4] {
+    pub(super) fn angular_velocity(&self, channel: &CrowdChannel) -> [f32; 4] {
         let form = channel.form_and_base >> 24;
         if form == FORM_CONSTANT {
             return [0.0; 4];
         }
-        let (span, s, rate) = self.along(channel);
+        let BasePosition {
+            along: span,
+            parameter_along: s,
+            rate,
+            ..
+        } = self.position(channel);
         let (rotation, slope) = match form {
+            FORM_KEYS | FORM_PACKED => {
+                let [middle, tangent] = self.rows(channel).arc(span);
+                (middle, tangent)
+            }
             // The angular velocity of an arc is the same everywhere.
             FORM_ARC => {
                 let first = channel.first + span * channel.count * 2;
@@ -1237,17 +1152,20 @@ impl ClipMoment<'_> {
 
     /// The derivative of a translation, in the parent's frame.
     #[inline(always)]
-    fn velocity(&self, channel: &CrowdChannel) -> [f32; 4] {
+    pub(super) fn velocity(&self, channel: &CrowdChannel) -> [f32; 4] {
         if channel.form_and_base >> 24 == FORM_CONSTANT {
             return [0.0; 4];
         }
-        let (span, s, rate) = self.along(channel);
+        let BasePosition {
+            along: span,
+            parameter_along: s,
+            rate,
+            ..
+        } = self.position(channel);
         let (_, [x, y, z, _]) = match channel.form_and_base >> 24 {
             FORM_CUBIC => self.polynomial::<4>(channel, span, s),
             FORM_LINE => {
-                let base = (channel.form_and_base & 0x00ff_ffff) as usize;
-                let rows = KeyRows::new(self.cells, channel, self.bases[base].count as usize);
-                let [middle, rise] = rows.line(span);
+                let [middle, rise] = self.rows(channel).line(span);
                 (middle, rise)
             }
             _ => self.polynomial::<POWERS>(channel, span, s),

@@ -2,7 +2,7 @@
 //! rotations need, in the same order of operations.
 
 use crate::shader::*;
-use crate::simd::lanes::Number;
+use crate::simd::lanes::{Choice, Number};
 pub(crate) use crate::twin::functions::{arc_tangent, flushed, reciprocal, reciprocal_root, root};
 
 /// The root of a number of which the reciprocal root is known.
@@ -26,6 +26,15 @@ pub(crate) fn flat_arc_tangent<N: Number>(small: N, large: N) -> N {
     tail * (z * t) + t
 }
 
+/// The angle of the point (along, up), neither of which is negative and not both are 0, from 0 to pi/2.
+#[inline(always)]
+pub(crate) fn acute_angle<N: Choice>(up: N, along: N) -> N {
+    let is_flat = up.at_most(along);
+    let small = N::choose(is_flat, up, along);
+    let flat = flat_arc_tangent(small, N::choose(is_flat, along, up));
+    N::choose(is_flat, flat, N::all(HALF_PI) - flat + N::all(HALF_PI_LOW))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -41,6 +50,8 @@ mod tests {
             let expected = f64::from(y).atan2(f64::from(x));
             let found = f64::from(arc_tangent(y, x));
             worst = worst.max((found - expected).abs() / (0.1 + expected.abs()));
+            let acute = acute_angle(y.abs(), x.abs());
+            assert_eq!(acute.to_bits(), arc_tangent(y.abs(), x.abs()).to_bits());
             let square = x * x + y * y;
             let exact = f64::from(square).sqrt();
             assert!((f64::from(root(square)) - exact).abs() <= 1.2e-7 * exact);

@@ -6,11 +6,14 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
-use tumble_formats::compare::{ChannelDifference, ClipDifference, ScalarDifference};
+use tumble_formats::compare::{
+    ArrayDifference, ChannelDifference, ClipDifference, PathDifference, ScalarDifference,
+};
 use tumble_formats::motion::ScalarKind;
 use tumble_formats::printable::printable;
 
 use crate::arguments::input::{Inputs, directory_failure};
+use crate::commands::compare::table::aligned;
 use crate::commands::compare::text::not_finite;
 use crate::commands::compare::{Arguments, ComparisonReport, FaultKind};
 use crate::messages::exit::{ALL_INPUTS, DIFFERENCE, Failure, Outcomes};
@@ -50,6 +53,9 @@ struct FilePair {
     file: String,
     #[serde(flatten)]
     differences: Option<LargestDifferences>,
+    /// The errors of the second as an estimate of the first, where trajectories are compared.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    trajectory: Option<Box<PathDifference>>,
     /// Why they cannot be compared.
     #[serde(skip_serializing_if = "Option::is_none")]
     error: Option<String>,
@@ -115,26 +121,39 @@ pub(super) fn run(arguments: &Arguments, folders: [&Path; 2]) -> Result<(), Fail
     let mut partial = 0;
     let mut of_kinds: BTreeMap<FaultKind, usize> = BTreeMap::new();
     for (file, paths) in pairs {
-        let compared = arguments.compared(paths);
-        let (pair, outcome) = match compared {
+        let mut pair = FilePair {
+            file,
+            differences: None,
+            trajectory: None,
+            error: None,
+        };
+        match arguments.compared(paths) {
             Ok((found, rest)) => {
                 let faults = arguments.faults(&found).into_iter();
                 let kinds: BTreeSet<FaultKind> = faults.map(|(kind, _)| kind).collect();
                 for kind in kinds {
                     *of_kinds.entry(kind).or_default() += 1;
                 }
-                let largest = LargestDifferences::of(&found);
-                partial += usize::from(largest.unshared_seconds > 0.0);
-                (Ok(largest), rest)
+                match found {
+                    ComparisonReport::Trajectory(found) => pair.trajectory = Some(found),
+                    ComparisonReport::Clips(clips) => {
+                        let mut largest = LargestDifferences::default();
+                        clips.iter().for_each(|clip| largest.add(clip));
+                        partial += usize::from(largest.unshared_seconds > 0.0);
+                        pair.differences = Some(largest);
+                    }
+                    ComparisonReport::Array(found) => {
+                        pair.differences = Some(LargestDifferences::of_arrays(&found));
+                    }
+                }
+                outcomes.add(rest);
             }
-            Err(failure) => (Err(failure.message().to_owned()), Err(failure)),
-        };
-        outcomes.add(outcome);
-        report.pairs.push(FilePair {
-            file,
-            differences: pair.as_ref().ok().copied(),
-            error: pair.err(),
-        });
+            Err(failure) => {
+                pair.error = Some(failure.message().to_owned());
+                outcomes.add(Err(failure));
+            }
+        }
+        report.pairs.push(pair);
         if outcomes.is_ended() {
             break;
         }
@@ -178,25 +197,18 @@ pub(super) fn run(arguments: &Arguments, folders: [&Path; 2]) -> Result<(), Fail
 }
 
 impl LargestDifferences {
-    fn of(report: &ComparisonReport) -> Self {
-        let mut all = Self::default();
-        match report {
-            ComparisonReport::Clips(clips) => clips.iter().for_each(|clip| all.add(clip)),
-            ComparisonReport::Array(found) => match &found.rotation {
-                Some(rotation) => all.angle = rotation.largest,
-                None => {
-                    all.number = found.difference.largest;
-                    all.not_finite = found.not_finite;
-                }
+    fn of_arrays(found: &ArrayDifference) -> Self {
+        match &found.rotation {
+            Some(rotation) => Self {
+                angle: rotation.largest,
+                ..Self::default()
             },
-            ComparisonReport::Trajectory(found) => {
-                for errors in found.ape.iter().chain(&found.rpe) {
-                    all.angle = all.angle.max(errors.rotation.max);
-                    all.distance = all.distance.max(errors.translation.max);
-                }
-            }
+            None => Self {
+                number: found.difference.largest,
+                not_finite: found.not_finite,
+                ..Self::default()
+            },
         }
-        all
     }
 
     fn add(&mut self, clip: &ClipDifference) {
@@ -234,9 +246,10 @@ impl LargestDifferences {
 }
 
 impl FolderDifference {
-    /// A line for each pair that differs, and a summary.
+    /// A line for each pair that differs, or a table of the errors of all trajectories, and a summary.
     fn text(&self) -> String {
-        let mut text = String::new();
+        let mut text = self.trajectories_text();
+        let is_of_trajectories = !text.is_empty();
         let (mut same, mut failed) = (0, 0);
         for pair in &self.pairs {
             let name = printable(&pair.file);
@@ -268,18 +281,24 @@ impl FolderDifference {
                     }
                     let _ = writeln!(text, "{name}: {}", parts.join(", "));
                 }
-                _ => {
+                (None, None) => {}
+                (None, Some(_)) => {
                     failed += 1;
                     let _ = writeln!(text, "{name}: not compared");
                 }
             }
         }
         let pairs = words::count(self.pairs.len(), "pair");
-        let differing = self.pairs.len() - same - failed;
-        let _ = write!(
-            text,
-            "{pairs} of files: {same} without a difference, {differing} with one"
-        );
+        let _ = match is_of_trajectories {
+            true => write!(text, "{pairs} of trajectories"),
+            false => {
+                let differing = self.pairs.len() - same - failed;
+                write!(
+                    text,
+                    "{pairs} of files: {same} without a difference, {differing} with one"
+                )
+            }
+        };
         if failed > 0 {
             let _ = write!(text, ", {failed} not compared");
         }
@@ -295,5 +314,31 @@ impl FolderDifference {
         }
         text.push('\n');
         text
+    }
+
+    /// A row for each kind of errors of each pair of trajectories; empty where there are none.
+    fn trajectories_text(&self) -> String {
+        let mut rows = Vec::new();
+        for pair in &self.pairs {
+            let Some(found) = &pair.trajectory else {
+                continue;
+            };
+            for (kind, errors) in [("absolute", &found.ape), ("relative", &found.rpe)] {
+                let Some(errors) = errors else { continue };
+                let mut row = vec![printable(&pair.file).into_owned(), kind.to_owned()];
+                row.push(errors.count.to_string());
+                for (numbers, unit) in [(&errors.translation, ""), (&errors.rotation, "°")] {
+                    let numbers = [numbers.rmse, numbers.max];
+                    row.extend(numbers.map(|it| format!("{}{unit}", words::decimals(it))));
+                }
+                rows.push(row);
+            }
+        }
+        if rows.is_empty() {
+            return String::new();
+        }
+        let names = "file,errors,count,translation rmse,max,rotation rmse,max";
+        rows.insert(0, names.split(',').map(str::to_owned).collect());
+        aligned(&rows, 2)
     }
 }

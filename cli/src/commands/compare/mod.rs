@@ -47,8 +47,8 @@ With --ape, --rpe or --align, the second input is an estimate of the trajectory 
 compared as by the program evo, after the alignment by --align, at the times of the input with fewer \
 poses. The other is interpolated there by lines and arcs; --associate nearest:0.01 takes its nearest \
 pose within 0.01 s instead, as evo does. --tolerance and --distance are then limits of the absolute errors.
-Of two directories, the files with the same relative names are compared: a line for each pair that differs, and a \
-summary. With --tolerance or --distance the exit code is 8 if a pair exceeds it, if one of a pair is longer, or if a file is \
+Of two directories, the files with the same relative names are compared: a line for each pair that differs (of \
+trajectories a table of the errors of all), and a summary. With --tolerance or --distance the exit code is 8 if a pair exceeds it, if one of a pair is longer, or if a file is \
 in only one.
 
 Examples:
@@ -348,6 +348,11 @@ impl Arguments {
             let message = "trajectories are compared in the world at their poses; leave out --fps and --world";
             return Err(Failure::usage(message));
         }
+        let is_absolute = self.ape || self.rpe.is_none();
+        if !is_absolute && (self.tolerance.is_some() || self.distance.is_some()) {
+            let message = "--tolerance and --distance are limits of absolute errors; add --ape, or leave them out";
+            return Err(Failure::usage(message));
+        }
         let associate = self.associate.unwrap_or_default();
         if matches!(associate, Associate::Nearest(_)) && self.max_gap.is_some() {
             return Err(Failure::usage(
@@ -380,7 +385,7 @@ impl Arguments {
             Engine::new(Device::Cpu).map_err(|error| Failure::evaluating(&names[0], &error))?;
         let measure = PathMeasure {
             align: self.align.unwrap_or_default(),
-            is_absolute: self.ape || self.rpe.is_none(),
+            is_absolute,
             step: self.rpe,
             associate,
             max_gap: self.max_gap,

@@ -112,24 +112,7 @@ pub(super) fn joints_text(difference: &ClipDifference, arguments: TableArguments
         }
         rows.push(row);
     }
-    let columns = rows[0].len();
-    let widths: Vec<usize> = (0..columns)
-        .map(|column| {
-            rows.iter()
-                .map(|row| row[column].chars().count())
-                .max()
-                .unwrap_or(0)
-        })
-        .collect();
-    let line = |row: &Vec<String>| {
-        let cells = row.iter().zip(&widths).enumerate();
-        let cells = cells.map(|(column, (cell, &width))| match column {
-            0 => format!("{cell:<width$}"),
-            _ => format!("{cell:>width$}"),
-        });
-        format!("  {}\n", cells.collect::<Vec<_>>().join("  "))
-    };
-    let table: String = rows.iter().map(line).collect();
+    let table = aligned(&rows, 1);
     match differing - joints.len() {
         0 => table,
         rest => format!(
@@ -137,6 +120,25 @@ pub(super) fn joints_text(difference: &ClipDifference, arguments: TableArguments
             words::count(rest, "more joint"),
         ),
     }
+}
+
+/// The lines of a table, each indented: texts in the first `texts` columns, numbers in the others.
+pub(super) fn aligned(rows: &[Vec<String>], texts: usize) -> String {
+    let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
+    let width = |column: usize| {
+        let cells = rows.iter().filter_map(|row| row.get(column));
+        cells.map(|cell| cell.chars().count()).max().unwrap_or(0)
+    };
+    let widths: Vec<usize> = (0..columns).map(width).collect();
+    let line = |row: &Vec<String>| {
+        let cells = row.iter().zip(&widths).enumerate();
+        let cells = cells.map(|(column, (cell, &width))| match column < texts {
+            true => format!("{cell:<width$}"),
+            false => format!("{cell:>width$}"),
+        });
+        format!("  {}\n", cells.collect::<Vec<_>>().join("  "))
+    };
+    rows.iter().map(line).collect()
 }
 
 fn row_of(joint: &str, angle: &str, distance: Option<&str>) -> Vec<String> {
