@@ -442,7 +442,7 @@ def test_forms_of_paths(rng, engine):
 def test_what_cannot_be_followed(rng, engine):
     times, points = np.arange(5.0), rng.normal(size=(5, 3))
     for (when, where), options, message in [
-        ((None, points), {}, "times: a path without times takes `duration`"),
+        ((None, points), {}, "times: a path without times needs `duration` in seconds"),
         ((times, points), dict(rate=1.0), "leave out `duration` and `rate`"),
         ((None, points), dict(rate=1.0, duration=2.0), "exclude each other"),
         ((None, points), dict(rate=-1.0), "rate: -1 is not a number greater than 0"),
