@@ -50,7 +50,7 @@ Exit codes:
   2 the command line is wrong      7 output could not be written
   3 some inputs failed             8 results differ or are missing, or nothing was proved
   4 all inputs failed              129 to 131, 141, 143 ended by a signal
-A result that is too large for the memory ends with 4, for the disk with 7; of several inputs, the others continue.";
+If a result is too large, the exit code is 4 (memory) or 7 (disk). A batch continues with its other inputs.";
 
 /// The command line.
 #[derive(Debug, Parser)]

@@ -177,7 +177,7 @@ fn what_cannot_be_compared_is_refused() {
         (
             &["compare", "part.dat", "late.dat"],
             4,
-            "no time lies in both",
+            "the inputs have no common time",
         ),
         (
             &["compare", "a.dat", "b.dat", "--tolerance", "-1"],
@@ -194,7 +194,7 @@ fn what_cannot_be_compared_is_refused() {
                 "compare", "a.dat", "b.dat", "--fps", "10", "--start", "3", "--end", "4",
             ],
             4,
-            "times from 3 to 4 s are asked for, and both have times from 0 to 2 s",
+            "times from 3 to 4 s are requested, but both have only times from 0 to 2 s",
         ),
         (
             &["compare", "truth.tum", "other.tum", "--ape", "--csv"],
@@ -890,7 +890,7 @@ fn times_outside_the_keys_are_left_out_or_refused() {
     ];
     let refused = run(folder, &at);
     assert_eq!(refused.code, 4, "{}", refused.words);
-    let says = "a.dat: none of the times lies between its keys: asked for 9 to 10 s, keys lie from 0 to 2 s";
+    let says = "a.dat: none of the requested times, 9 to 10 s, lies between its keys, 0 to 2 s";
     assert!(refused.words.contains(says), "{}", refused.words);
     // Where the motion goes on, these times have values.
     succeed(folder, &[&at[..], &["--after", "loop"]].concat());
@@ -978,7 +978,7 @@ fn offsets_of_clocks_are_possible_ones() {
     let line = ["compare", "a.dat", "b.dat", "--time-offset"];
     let refused = run(folder, &[&line[..], &["1e300"]].concat());
     assert_eq!(refused.code, 2, "{}", refused.words);
-    let expected = "two clocks are not 1e300 s apart: expected seconds from -1e11 to 1e11";
+    let expected = "1e300 s is too long a time between two clocks; give seconds from -1e11 to 1e11";
     assert!(refused.words.contains(expected), "{}", refused.words);
     let third = succeed(folder, &[&line[..], &["0.333333333333"]].concat());
     let expected =

@@ -300,7 +300,8 @@ fn resuming_looks_at_bytes() {
     );
     let slerp = ["-m", "slerp", "--resume"];
     let refused = run(folder, &shard("out", &bytes, "1/1", &slerp));
-    let expected = "out: has shards with another value of option --method; give it as they have it";
+    let expected =
+        "out: has shards that were made with another value of option --method; use the same value";
     assert!(
         refused.code == 2 && refused.words.contains(expected),
         "{}",

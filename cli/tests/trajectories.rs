@@ -397,7 +397,7 @@ fn times_of_the_file_may_be_asked_for() {
             &format!("eval keys.csv -m slerp {options} --to csv --overwrite -o out.csv"),
         );
         assert!(
-            !said.words.contains("asked for"),
+            !said.words.contains("requested times"),
             "{options}: {}",
             said.words
         );

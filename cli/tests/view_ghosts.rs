@@ -249,7 +249,7 @@ fn moments_are_those_of_the_files_clocks() {
     }
     // Inputs without a common time are shown one at a time.
     let (words, page) = open(at, "a.tum late.tum");
-    let apart = "no time lies in both: a.tum from 1700000000 to 1700000004 s, \
+    let apart = "the inputs have no common time: a.tum from 1700000000 to 1700000004 s, \
                  late.tum from 1700000100 to 1700000104 s; \
                  they are shown one at a time, chosen in the menu";
     assert!(words.lines().any(|found| found == apart), "{words}");

@@ -42,7 +42,7 @@ impl OverBudget {
             true => format!("the limit is {limit}"),
             false => {
                 format!(
-                    "the limit for an input of this length is {limit}; it states more than it contains"
+                    "the limit for an input of this length is {limit}; it states more data than it contains"
                 )
             }
         }

@@ -332,7 +332,7 @@ impl Loaded {
                 false => format!("-{axis}"),
             });
         let message = format!(
-            "glTF is in metres with y up, and the clip in units of {} m with {} up; --up-axis y --scale metres \
+            "glTF requires metres and y up, and the clip has units of {} m and {} up; --up-axis y --scale metres \
              converts it",
             space.metres,
             axis.collect::<String>()

@@ -156,7 +156,7 @@ pub fn read_kitti(
         (Some(found), _) => {
             if found.times.len() != count {
                 let message = format!(
-                    "{}, and {} for them; is it another sequence's file of times?",
+                    "the file has {}, and the file of times has {}; does it belong to another sequence?",
                     counted(count, "pose"),
                     counted(found.times.len(), "time")
                 );

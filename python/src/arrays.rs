@@ -85,7 +85,7 @@ fn as_array<'py>(value: &Bound<'py, PyAny>, label: &str) -> PyResult<Bound<'py, 
     }
     if value.is_instance_of::<PyUntypedArray>() && value.hasattr(intern!(py, "mask"))? {
         return Err(input(format!(
-            "{label}: a masked array; fill or remove what is masked"
+            "{label}: a masked array; fill or remove the masked elements"
         )));
     }
     let speaks_dlpack = value.hasattr(intern!(py, "__dlpack__"))?;

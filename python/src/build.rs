@@ -278,8 +278,8 @@ fn layout_of(
                 Ok(Layout::TrackMajor)
             }
             _ => refused(format!(
-                "both axes may be that of the frames; say which it is by {by_track}, (tracks, keys, 4), or {by_frame}, \
-             (frames, tracks, 4)"
+                "both axes may be the axis of the frames; state which one it is by {by_track}, (tracks, keys, 4), \
+                 or {by_frame}, (frames, tracks, 4)"
             )),
         },
         None | Some(Layout::TrackMajor) if second != count && first == count => refused(format!(

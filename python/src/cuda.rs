@@ -75,7 +75,7 @@ impl fmt::Display for CudaError {
                 )
             }
             #[cfg(not(unix))]
-            Self::NoFiles => write!(f, "arrays on a card are made on Linux alone"),
+            Self::NoFiles => write!(f, "arrays in a card's memory are supported only on Linux"),
             Self::Vulkan(error) => error.fmt(f),
         }
     }

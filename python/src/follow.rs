@@ -238,7 +238,7 @@ pub(crate) fn follow<'py>(
     let made = paths_of("points", "", paths, options.pace()?).map_err(|fault| {
         let message = match options.pace() {
             Ok(None) if key_times.is_none() => {
-                "times: a path without times takes `duration`, seconds, or `rate`, its speed"
+                "times: a path without times needs `duration` in seconds, or `rate`, its speed"
                     .to_owned()
             }
             Ok(Some(_)) if key_times.is_some() => {

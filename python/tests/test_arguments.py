@@ -354,7 +354,7 @@ def test_keys_of_frames_are_read_by_their_layout():
 
 def test_as_many_tracks_as_keys_need_a_layout(rng):
     keys, times = unit(rng, 5, 5), np.arange(5.0)
-    both = r'both axes may be that of the frames; say which it is by {}layout="track"'
+    both = r'both axes may be the axis of the frames; state which one it is by {}layout="track"'
     with pytest.raises(tumble.InputError, match=both.format("")):
         tumble.Clip(times, keys)
     with pytest.raises(tumble.InputError, match=both.format(r"Clip\(times, keys, ")):

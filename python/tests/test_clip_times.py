@@ -103,7 +103,7 @@ def test_clips_that_do_not_fit_are_not_joined(rng):
         ([], {}, "clips: there are no clips"),
         ([first, clip(rng, names=["hip", "knee", "toe"])], {}, "clips: .*(foot|toe)"),
         ([first, uneven], {}, "gap: the clips have no common rate"),
-        ([first, first], {"gap": 0.0}, "gap: the rotation of `hip` is another at the end of clip 0"),
+        ([first, first], {"gap": 0.0}, "gap: the rotation of `hip` differs between the end of clip 0"),
         ([first, first], {"gap": -1.0}, "gap: -1 is no number of seconds"),
         ([first, clip(rng, scalars={"grip": ([0.0], [1.0])})], {}, "names or the order of their scalars"),
     ]:

@@ -389,7 +389,7 @@ def test_times_outside_the_keys_are_left_out(clip, engine, tmp_path):
         assert tumble.load(tmp_path / "kept.csv").clip.times(0).tolist() == pytest.approx(times)
     assert engine.evaluate(clip, at=1.0, **both).shape == (3, 4)
     for at in [2.5, [-1.0, 2.5]]:
-        words = "none of the times lies between its keys: asked for .* to 2.5 s, keys lie from 0 to 2 s"
+        words = "none of the requested times, .* to 2.5 s, lies between its keys, 0 to 2 s"
         with pytest.raises(tumble.InputError, match=words):
             engine.evaluate(clip, at=at, **both)
     for at in [[[0.0]] * 3, [[0.0, 1.0], [0.0], [0.0]]]:

@@ -617,7 +617,7 @@ pub(crate) fn clock_difference(text: &str) -> Result<f64, String> {
     match finite_seconds(text)? {
         difference if difference.abs() <= LARGEST => Ok(difference),
         _ => Err(format!(
-            "two clocks are not {text} s apart: expected seconds from -1e11 to 1e11"
+            "{text} s is too long a time between two clocks; give seconds from -1e11 to 1e11"
         )),
     }
 }

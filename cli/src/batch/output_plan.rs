@@ -232,7 +232,7 @@ pub(crate) fn without_results(
     match left.is_empty() {
         false => Ok(left),
         true => Err(Failure::usage(format!(
-            "{}: has results alone, and no other input was given",
+            "{}: contains only results, and no other input was given",
             folder.display()
         ))),
     }

@@ -161,7 +161,7 @@ impl<'a> Messages<'a> {
         let Some((message, data)) = next else {
             return Ok(None);
         };
-        let reason = "a message is neither rows nor words; the file is damaged";
+        let reason = "a message is neither a batch of rows nor a dictionary; the file is damaged";
         let body = match message.header_type() {
             MessageHeader::DictionaryBatch => {
                 let batch = message.header_as_dictionary_batch();

@@ -291,7 +291,7 @@ impl<R: BufRead> Parser<'_, R> {
         for word in &names {
             let Some(channel) = WrittenChannel::named(&word.text) else {
                 let message = format!(
-                    "`{}` is not a channel; there are Xposition, Xrotation and those of Y and Z",
+                    "`{}` is not a channel; channels are Xposition and Xrotation, and the same for Y and Z",
                     word.text
                 );
                 return Err(self.refuse(word, Code::BvhChannel, message));

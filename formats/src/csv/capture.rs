@@ -78,8 +78,8 @@ impl CaptureHeading {
                 _ => {
                     let program = if is_motive { "Motive" } else { "Vicon" };
                     let message = format!(
-                        "it begins as a table of {program}, but no row begins with `Frame`, as the one that names the \
-                         columns does; export it again"
+                        "the file begins as a table of {program}, but no row begins with `Frame`, so the names of the \
+                         columns are missing; export it again"
                     );
                     return Err(Diagnostic::new(file, Code::NoTimes, message));
                 }
@@ -176,11 +176,14 @@ fn motive(rows: &[Row]) -> Result<CaptureHeading, String> {
 /// the units.
 fn vicon(rows: &[Row], units: &[String]) -> Result<CaptureHeading, String> {
     let [table, rate, .., bodies, columns] = rows else {
-        return Err("it has no row of names above that of columns".to_owned());
+        return Err(
+            "the row with the names of bodies, above the names of the columns, is missing"
+                .to_owned(),
+        );
     };
     let rate_text = at(rate, 0);
     let rate: FrameRate = rate_text.parse().map_err(|_| {
-        format!("`{rate_text}`, in the second line of a table of Vicon, is no rate of frames")
+        format!("`{rate_text}`, in the second line of a table of Vicon, is not a frame rate")
     })?;
     let body = |column: usize| {
         let first = column.saturating_sub(NAMED_COLUMNS - 1);

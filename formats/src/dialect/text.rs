@@ -97,7 +97,7 @@ pub(crate) fn read(
             }
             let count = text.split(',').count();
             let message = match count == width {
-                true => "a cell is not a number; the lines before have numbers alone".to_owned(),
+                true => "a cell is not a number; the lines before have only numbers".to_owned(),
                 false => format!("{count} numbers, and the lines before have {width}"),
             };
             return Err(Diagnostic {

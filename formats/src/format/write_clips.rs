@@ -106,7 +106,7 @@ pub(crate) fn check_times(sampled: &SampledClip<'_>, name: &str) -> Result<(), D
 
 /// Why a number of clips other than one is not written to a file of a format that holds one.
 pub(crate) fn not_one_clip(count: usize, file: &str) -> String {
-    format!("{count} clips; {file} holds one: choose it with --animation")
+    format!("the input has {count} clips, and {file} holds one: choose it with --animation")
 }
 
 /// Refuses times that a reader of this format would take for milliseconds or smaller units ([`TimeUnit::of_large`]).

@@ -60,8 +60,8 @@ impl Document for GltfDocument {
             let fits = 1.0 / spacing;
             let fits = if fits >= 1.0 { fits.floor() } else { fits };
             let message = format!(
-                "at {last} s, times in f32 are {spacing} s apart, and frames at {rate} fps {} s; give --fps {fits} or \
-                 less",
+                "at {last} s, steps of f32 are {spacing} s, longer than the {} s of a frame at {rate} fps; give \
+                 --fps {fits} or less",
                 1.0 / rate.per_second()
             );
             return Err(self.refuse(clip, Code::TimesInF32, message));

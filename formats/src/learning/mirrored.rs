@@ -66,7 +66,7 @@ pub enum MirrorError {
     },
     /// Two joints turn or move along axes that are no mirror images.
     #[error(
-        "{} mirrored {}; is the axis from left to right another? It is y for robots that face x",
+        "{} mirrored {}; is another axis the one from left to right? It is y for robots that face x",
         if joint == partner { format!("the joint `{joint}` does not move along its own") } else { format!("the joints `{joint}` and `{partner}` do not move along") },
         if joint == partner { "axis" } else { "axes" }
     )]

@@ -332,7 +332,7 @@ impl<'a> Records<'a> {
         })?;
         if unpacked.len() != size {
             let message = format!(
-                "a chunk has {} bytes, and says that it has {size}",
+                "a chunk has {} bytes, but its header says {size}",
                 unpacked.len()
             );
             return Err(self.damaged(offset, message));
@@ -341,7 +341,7 @@ impl<'a> Records<'a> {
         crc.update(&unpacked);
         if sum != 0 && crc.sum() != sum {
             let message = format!(
-                "the checksum of a chunk is {:#010x}, and it says {sum:#010x}",
+                "the checksum of a chunk is {:#010x}, but its header says {sum:#010x}",
                 crc.sum()
             );
             return Err(self.damaged(offset, message));

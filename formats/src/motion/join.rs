@@ -39,8 +39,8 @@ pub enum JoinError {
     },
     /// Without time between two clips, the end of one is not the start of the next.
     #[error(
-        "{channel} is another at the end of clip {clip} than at the start of the next, and no time is between the two; \
-         state a number of seconds greater than 0"
+        "{channel} differs between the end of clip {clip} and the start of the next clip, and there is no time between the \
+         two; state a number of seconds greater than 0"
     )]
     Apart {
         /// The index of the clip.

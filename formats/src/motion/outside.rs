@@ -106,7 +106,7 @@ pub enum OutsideError {
     Samples(#[from] SampleTimesError),
     /// All lie outside the keys. The numbers are seconds.
     #[error(
-        "none of the times lies between its keys: asked for {} to {} s, keys lie from {} to {} s",
+        "none of the requested times, {} to {} s, lies between its keys, {} to {} s",
         asked[0], asked[1], keys[0], keys[1]
     )]
     NothingInCommon {

@@ -247,7 +247,7 @@ impl Archive {
         }
         if let Element::Class(class) = &header.element {
             let message = format!(
-                "it is an object of {class}, which is not read; save it as numbers or a text"
+                "the value is an object of {class}, which is not read; save it as numbers or a text"
             );
             return Err(self.refuse(member, Code::ObjectForValue, message));
         }

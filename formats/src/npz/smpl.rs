@@ -183,7 +183,7 @@ pub(crate) fn plan(
             let tracks = plan.tracks;
             warnings.warn(Code::UnknownBody, || {
                 let message = format!(
-                    "{tracks} joints are not those of a known body (22, 24, 52 and 55 are); they have no names"
+                    "bodies of {tracks} joints are not known (22, 24, 52 and 55 are), so the joints have no names"
                 );
                 (None, message)
             });

@@ -240,8 +240,8 @@ impl Class {
         // In Python, dots in a name lead to members of a class.
         if is_refused || name.contains('.') {
             return Err(format!(
-                "it names {class}, which Python would run; only numbers, texts and arrays are \
-                 read: save these alone"
+                "the file names {class}, which Python would run; only numbers, texts and arrays \
+                 are read: save only these"
             ));
         }
         Ok(Self::Other(class))

@@ -463,7 +463,7 @@ fn choose(
             format!(" (and these, which follow them: {mimics})")
         });
         return Err(refuse(format!(
-            "the file has {} without a name, and the robot {}: {}{mimics}",
+            "the file has {} without names, but the robot has {}: {}{mimics}",
             counted(names.len(), "joint"),
             joints.len(),
             joints.join(", ")
@@ -604,9 +604,8 @@ fn checked(
     if !is_named && stated.is_none() {
         return Err(refuse(format!(
             "the file does not name its joints, and in no order do the bodies of `{array}` agree with the \
-             robot's joints (they are at least {farthest:.3} m away): it is another robot, or another version \
-             of it; --source-body-order \
-             takes an order without this check"
+             robot's joints (they are at least {farthest:.3} m away): the file may be of another robot, or of \
+             another version of it; --source-body-order takes an order without this check"
         )));
     }
     warnings.warn(Code::OtherRobot, || {

@@ -119,7 +119,7 @@ impl<'a> Reader<'a> {
             None => euler_sequence("xyz").unwrap_or_default(),
             Some(&(element, value)) => euler_sequence(value).ok_or_else(|| {
                 let message =
-                    format!("`eulerseq` is `{value}`; it has three of the letters xyzXYZ");
+                    format!("`eulerseq` is `{value}`; it must have three of the letters xyzXYZ");
                 documents.refuse(element, Code::RobotElement, message)
             })?,
         };
@@ -242,7 +242,8 @@ impl<'a> Reader<'a> {
             return Ok(DQuat::IDENTITY);
         };
         if let Some(other) = names.next() {
-            let message = format!("has both `{name}` and `{other}`; one says the orientation");
+            let message =
+                format!("has both `{name}` and `{other}`; only one may state the orientation");
             return Err(documents.refuse(element, Code::RobotTree, message));
         }
         let unit = |vector| documents.unit(element, name, vector);
@@ -296,7 +297,7 @@ impl<'a> Reader<'a> {
     ) -> Result<TreeJoint, Diagnostic> {
         let documents = self.documents;
         let Some(body) = body.map(|body| &self.bodies[body]) else {
-            let message = "a joint moves a body, and this one is in the world";
+            let message = "a joint must be in a body, but this one is in the world";
             return Err(documents.refuse(element, Code::RobotTree, message));
         };
         let index = self.joint_count;
@@ -314,8 +315,9 @@ impl<'a> Reader<'a> {
             _ if documents.tag(element) == "freejoint" => JointKind::Free,
             None => JointKind::Hinge,
             Some((at, value)) => value.parse().map_err(|_| {
-                let message =
-                    format!("the type `{value}` is none of a joint: free, ball, slide, hinge");
+                let message = format!(
+                    "`{value}` is not a type of joint; there are free, ball, slide and hinge"
+                );
                 documents.refuse(at, Code::RobotTree, message)
             })?,
         };

@@ -125,7 +125,8 @@ impl ShardPlan {
         let files = inputs.files;
         if let Some(pipe) = files.iter().find(|found| names::is_standard(&found.path)) {
             let name = names::input(&pipe.path);
-            let message = format!("{name}: no other process can read it; give a file");
+            let message =
+                format!("{name}: the other processes of the shards cannot read it; give a file");
             return Err(Failure::usage(message));
         }
         let format = result_names::format(folder, format)?;
@@ -186,14 +187,14 @@ impl ShardPlan {
             if found.options != self.recorded.options {
                 let changed = changed_options(&found.options, &self.recorded.options);
                 return Err(Failure::usage(format!(
-                    "{shown}: has shards with another value of {changed}; give it as they have it, another directory, or \
-                     --overwrite to make all again"
+                    "{shown}: has shards that were made with another value of {changed}; use the same value, give another \
+                     directory, or --overwrite to make all again"
                 )));
             }
             if !resume {
                 return Err(Failure::usage(format!(
-                    "{shown}: has shards of another list or another tumble; --resume keeps what is the same, \
-                     --overwrite makes all again"
+                    "{shown}: has shards of another list of inputs, or of another version of tumble; \
+                     --resume keeps the shards that are the same, --overwrite makes all again"
                 )));
             }
         }

@@ -76,10 +76,10 @@ pub(crate) struct Arguments {
     /// Where to end, seconds [default: the last time that both have]
     #[arg(long, value_name = "SECONDS", value_parser = finite_seconds, allow_hyphen_values = true)]
     end: Option<f64>,
-    /// Seconds to add to the times of the second input, whose clock is another
+    /// Seconds to add to the times of the second input, if it has another clock
     #[arg(long, value_name = "SECONDS", value_parser = clock_difference, allow_hyphen_values = true)]
     time_offset: Option<f64>,
-    /// --source-order of the second input, where it is another than that of the first
+    /// --source-order of the second input, if it differs from that of the first
     #[arg(long, value_name = "ORDER", value_parser = component_order())]
     second_source_order: Option<ComponentOrder>,
     /// Compare joints in the world instead of relative to their parents
@@ -160,7 +160,7 @@ fn partners(paths: [&Path; 2], clips: [&[Motion]; 2]) -> Result<Vec<usize>, Fail
     let found_or_refused = |index: usize| {
         partner([&all[0], &all[1]], index).ok_or_else(|| {
             let message = format!(
-                "{} {} is not exactly one animation of {}; choose one of each (--animation)",
+                "{} {} has not exactly one partner of the same name in {}; choose one animation of each (--animation)",
                 names::input(paths[0]),
                 names::clip(&clips[0][index]),
                 names::input(paths[1])
@@ -370,7 +370,7 @@ impl Arguments {
             // Keep all other tracks of the clip, because the position of a track depends on its ancestors.
             let &[track] = &chosen[..] else {
                 let message = format!(
-                    "{name}: has {}; a path is one, choose it with --tracks",
+                    "{name}: has {}; a trajectory has one, choose it with --tracks",
                     words::count(chosen.len(), "track")
                 );
                 return Err(Failure::new(ALL_INPUTS, message));
@@ -454,7 +454,7 @@ impl Arguments {
             (
                 !tolerates,
                 "--tolerance",
-                "none is an angle; leave it out, or require by 0 that all are equal",
+                "none is an angle; leave it out, or give 0 to require that all are equal",
             ),
             (!distances, "--distance", "none is a length; leave it out"),
         ] {

@@ -171,7 +171,7 @@ impl EvaluationOptions {
     /// Refuses everything that can be refused before the inputs are known.
     pub(crate) fn new(arguments: &Arguments) -> Result<Self, Failure> {
         if arguments.sampling.reads_standard_input() {
-            let message = "--times -: no other process can read it; give a file";
+            let message = "--times -: the other processes of the shards cannot read standard input; give a file";
             return Err(Failure::usage(message));
         }
         arguments.results.check_shards()?;

@@ -67,7 +67,7 @@ pub(crate) struct Arguments {
     lab: Option<PathBuf>,
     #[command(flatten)]
     output: ReportOutput,
-    /// Compare two proofs instead: bits, then figures
+    /// Compare two proofs instead: first their bits, then their measured times
     #[arg(
         long,
         num_args = 2,

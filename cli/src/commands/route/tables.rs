@@ -223,7 +223,8 @@ pub(super) fn read_walkers(path: &Path) -> Result<Participants, Failure> {
             Some(speed),
         ] = all
         else {
-            let message = "a walker needs speed, x, y, z, to_x, to_y and to_z; something that moves on a given track needs track";
+            let message =
+                "a walker needs speed, x, y, z, to_x, to_y and to_z; a moving obstacle needs track";
             return Err(refuse(path, line, Code::Walkers, message));
         };
         participants

@@ -298,8 +298,8 @@ fn warn_of_open_loop(name: &str, clip: &Motion, samples: &Samples) {
         .max_by(|(_, one), (_, other)| one.total_cmp(other));
     if let Some((track, apart)) = largest.filter(|(_, apart)| apart.to_degrees() > CLOSED) {
         let message = format!(
-            "--edges loop joins the last sample to the first, and they are up to {:.1}° apart ({}); this is no loop, or \
-             not a whole one",
+            "--edges loop joins the last sample to the first, but they are up to {:.1}° apart ({}); the clip is no loop, \
+             or not a whole one",
             apart.to_degrees(),
             clip.set.track_name(track)
         );

@@ -121,7 +121,7 @@ pub enum CompareError {
     },
     /// The time spans of the clips do not overlap.
     #[error(
-        "no time lies in both: {} from {} to {} s, {} from {} to {} s",
+        "the inputs have no common time: {} from {} to {} s, {} from {} to {} s",
         inputs[0], short(spans[0][0]), short(spans[0][1]), inputs[1], short(spans[1][0]), short(spans[1][1])
     )]
     NoTimeInBoth {
@@ -132,7 +132,7 @@ pub enum CompareError {
     },
     /// The requested times lie outside those that both clips have.
     #[error(
-        "{} and {}: times from {} to {} s are asked for, and both have times from {} to {} s",
+        "{} and {}: times from {} to {} s are requested, but both have only times from {} to {} s",
         inputs[0], inputs[1], short(range[0]), short(range[1]), short(common[0]), short(common[1])
     )]
     RangeOutside {
@@ -151,7 +151,7 @@ pub enum CompareError {
     },
     /// No pose of one path has one of the other at its time.
     #[error(
-        "no pose of one lies at a time of the other: {} from {} to {} s, {} from {} to {} s; both need one clock",
+        "no pose of one lies at a time of the other: {} from {} to {} s, {} from {} to {} s; both must use the same clock",
         inputs[0], short(spans[0][0]), short(spans[0][1]), inputs[1], short(spans[1][0]), short(spans[1][1])
     )]
     NoPoseInBoth {
