@@ -232,7 +232,7 @@ thread_local! {
 /// successful calls do not change it.
 #[unsafe(no_mangle)]
 pub extern "C" fn tumble_last_error() -> *const c_char {
-    // A thread that ends has no message any more.
+    // While a thread ends, its message may already have been destroyed.
     let message = LAST.try_with(|last| last.borrow().as_ptr());
     message.unwrap_or(c"".as_ptr())
 }
@@ -245,7 +245,7 @@ fn remember(message: &str) {
 
 /// The result of some work. If it fails or panics, the code of the error, whose message is stored for this thread.
 pub(crate) fn guarded<T>(work: impl FnOnce() -> Result<T, Failure>) -> Result<T, TumbleResult> {
-    // After a panic, values that are half changed are dropped, or their lock is poisoned, so nobody can use them.
+    // After a panic, a value that is only partly changed is dropped, or its lock is poisoned. So no later call uses it.
     let done = catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| Err(of_panic(&*panic)));
     done.map_err(|failure| {
         remember(&failure.message);

@@ -122,7 +122,8 @@ impl Decimal {
 
     /// The sum of whole seconds and a time with its shortest decimals; `None` outside ±1e14.
     pub(crate) fn of(whole: i64, time: f64) -> Option<Self> {
-        // The difference to the first time may have twice as many whole digits as a time.
+        // The whole seconds are added in i128, because `time` may be a difference from the first time, and so larger
+        // than any time.
         let digits = time.to_string();
         let (seconds, decimals) = digits.split_once('.').unwrap_or((&digits, "0"));
         let seconds = i128::from(whole) + seconds.parse::<i128>().ok()?;
@@ -155,7 +156,7 @@ impl Decimal {
     /// Seconds after a whole second, correctly rounded.
     pub(crate) fn since(self, whole: i64) -> f64 {
         match self.0.checked_sub(i128::from(whole) * SECOND) {
-            // Digits and a point.
+            // The text of the difference has only digits and a point, so it can be parsed as an f64, correctly rounded.
             Some(difference) => Self(difference).to_string().parse().unwrap_or(f64::NAN),
             // Such a number is a whole number in f64, so its whole seconds are exact.
             None => {

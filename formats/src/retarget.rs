@@ -316,7 +316,8 @@ pub fn retarget(
         );
         (samples.rotations[index].as_dquat().normalize(), position)
     };
-    // A body rests in the axes of its model, with y up, and moves in those of its world.
+    // The rest pose of a body model (SMPL) has y up, but its motion has the axes of the file's world. So the motion is
+    // rotated to y up.
     let mut stood_along = None;
     let mut to_model = DQuat::IDENTITY;
     if let Some(body) = &source.body {
@@ -458,7 +459,7 @@ pub fn retarget(
     }
     let mut motion = motion.with_scalars_of(source, 1.0)?;
     if let Some(body) = &mut motion.body {
-        // The rest pose that it was carried to is that of the model.
+        // The motion was rotated to the axes of the model, in which y is up.
         body.up = Some(DVec3::Y);
     }
     if !source.channels.is_empty() {

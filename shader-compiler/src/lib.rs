@@ -134,7 +134,7 @@ fn compile() -> Files {
     ];
     let mut hashes = hashes::of_folder(Path::new(ROOT), "shaders").expect("the shaders lie there");
     hashes.retain(|path, _| path.ends_with(".wgsl"));
-    // The engine's build looks at its shaders alone.
+    // The engine's build script checks only the files in `shaders/`.
     let made = (files.iter())
         .filter(|(path, _)| path.starts_with("shaders/"))
         .map(|(path, bytes)| ((*path).to_owned(), hashes::hash(bytes)));

@@ -127,7 +127,7 @@ fn reader(read: &Read, module: &Module, load: impl Fn(&str) -> String) -> String
             load("index / 2u"),
             scalars(&["pair.x", "pair.y"])
         ),
-        // A texel and a half.
+        // A value of 24 bytes takes one and a half texels.
         24 => format!(
             "let texel = (3u * index) / 2u;
              let first = {};

@@ -81,9 +81,9 @@ impl<'a> KeysOfTrack<'a> {
     }
 }
 
-/// The key in a row, of those at the starts of the spans and the one at the end.
+/// The key of a row. There is a row for the start of each span, and one for the end of the last span.
 struct RowKey {
-    /// As cells have it: four times as long where its authored sign is the other one.
+    /// The key as cells store it: multiplied by 4 if it was added with the opposite sign.
     stored: [f32; 4],
     weights: TangentWeights,
 }

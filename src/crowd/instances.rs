@@ -85,7 +85,7 @@ impl Instances {
                     continue;
                 }
                 let layer = CrowdLayer::moved(&old, clips, self.clock, clock);
-                // These values were packed before, so packing them again cannot fail.
+                // Packing cannot fail here, because the same values were packed before.
                 if let Ok(mut entry) = layer.packed(clips, masks, clock) {
                     entry.clip_and_weight = old.clip_and_weight;
                     self.set(index, entry);

@@ -760,7 +760,8 @@ impl Joint<f32> {
         let [x, y, z, w] = before.rotation;
         let [x, y, z, w] = product(after.rotation, [-x, -y, -z, w]).map(flushed);
         let sine = root(x * x + y * y + z * z);
-        // The shorter arc, by the rotation vector's length; 0 if the angle is.
+        // The factor from the vector part of the quaternion to the rotation vector of the shorter arc; 0 if the angle
+        // is 0.
         let scale = match sine == 0.0 {
             true => 0.0,
             false => 2.0 * arc_tangent(sine, w.abs()) * reciprocal(sine),
@@ -782,7 +783,8 @@ impl<N: Number> Joint<N> {
     fn hung_on(self, parent: &Self, moves: bool) -> Self {
         let arm = rotated(parent.rotation, self.position);
         let rotation = product(parent.rotation, self.rotation);
-        // One step of Newton's: rounding does not add up along the skeleton.
+        // One step of Newton's method normalises the rotation, so that rounding errors do not add up along the
+        // skeleton.
         let scale = N::all(1.5) - N::all(0.5) * dot(rotation, rotation);
         let [x, y, z, w] = rotation;
         let mut found = Self {
@@ -1084,7 +1086,7 @@ fn guessed_position(
     for _ in 0..GUESSES {
         let first = (index.saturating_sub(NEIGHBOURS / 2)).min(count.saturating_sub(NEIGHBOURS));
         let neighbours = &base_spans[first..count.min(first + NEIGHBOURS)];
-        // All are compared, because branches could not be predicted.
+        // All starts are compared without branches, because the processor could not predict these.
         let is_begun = |span: &CrowdSpan| usize::from(span.start & TICKS <= tick);
         let begun: usize = neighbours.iter().map(is_begun).sum();
         let is_found = begun > 0 && (begun < neighbours.len() || first + begun == count);

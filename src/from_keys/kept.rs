@@ -96,7 +96,7 @@ impl KeptKeys {
             data,
             curve,
         };
-        // An interval that was cut has several segments.
+        // The size is known only now: an interval that was divided has several segments.
         Ok((kept.bytes() <= bytes).then_some(kept))
     }
 

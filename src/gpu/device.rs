@@ -338,12 +338,12 @@ impl Drop for LogicalDevice {
         if !self.may_destroy() {
             return;
         }
-        // SAFETY: every object created from it held an `Arc` to this and is gone.
+        // SAFETY: every object created from it held an `Arc` to this and was dropped.
         unsafe { self.shared.free(&self.raw) };
-        // SAFETY: every object created from the device held an `Arc` to it and is gone.
+        // SAFETY: every object created from the device held an `Arc` to it and was dropped.
         unsafe { self.pipelines.destroy(&self.raw) };
         if self.owned {
-            // SAFETY: every object created from the device held an `Arc` to it and is gone.
+            // SAFETY: every object created from the device held an `Arc` to it and was dropped.
             unsafe { self.raw.destroy_device(None) };
         }
     }

@@ -299,10 +299,10 @@ impl ResidentMotions {
                 output: None,
             }),
         };
-        // Work on an exported result may still go on.
+        // The last call may have returned while the device still worked on its exported result.
         work.submission.wait()?;
         self.run_windows(&mut work, request, ranges, target)?;
-        // Not after an error, when a recording may be half way.
+        // After an error the work is dropped, because its recording may be incomplete.
         *kept = Some(work);
         Ok(())
     }
@@ -341,7 +341,8 @@ impl ResidentMotions {
             let last = count.min(first + window);
             self.submit(work, (&shape, ranges), first..last, target)?;
             let is_waited_for = match target {
-                // Its readers wait.
+                // The readers of an exported result wait for its semaphore. Only the last window may be left to them:
+                // the others reuse the same buffers.
                 StatesTarget::Exported(exported) => last < count || !exported.has_timeline(),
                 StatesTarget::InPlace(_) | StatesTarget::Copied(_) => true,
             };

@@ -56,7 +56,7 @@ pub struct PassTarget {
     /// Whether weights must be between 0 and 1.
     are_fractions: bool,
     bytes: u64,
-    // The descriptor sets refer to them. The caller guarantees that no work that uses them is in flight when the
+    // The descriptor sets refer to these buffers. The caller guarantees that no work that uses them is in flight when the
     // target is dropped.
     _buffers: Vec<Buffer>,
 }
@@ -304,7 +304,7 @@ impl PassTarget {
     /// the recording state, outside a render pass. The target must live until the work has ended. All recordings of
     /// one target must run on one queue.
     pub unsafe fn record(&self, commands: vk::CommandBuffer) {
-        // SAFETY: promised by the caller.
+        // SAFETY: as the caller promises.
         unsafe { self.record_between(commands, CommandScopes::default()) };
     }
 
@@ -314,7 +314,7 @@ impl PassTarget {
     /// # Safety
     /// As for [`PassTarget::record`]; and the application has its own barriers for other commands that use this memory.
     pub unsafe fn record_between(&self, commands: vk::CommandBuffer, scopes: CommandScopes) {
-        // SAFETY: promised by the caller.
+        // SAFETY: as the caller promises.
         let commands = unsafe { Commands::new(&self.engine.device, commands) };
         self.record_into(commands.between(scopes.with_earlier_recordings()));
     }

@@ -312,7 +312,7 @@ impl Drop for Semaphore {
             // A fence shows that the copy has ended. But Mesa's drivers that emulate timeline semaphores still use
             // them for a moment after they signal the fence.
             if !self.is_exported {
-                self.device.settle(); // timelines that can be exported are no such
+                self.device.settle(); // semaphores that can be exported are not emulated
             }
             // SAFETY: created from this device; the code that submits with it has waited for the work.
             unsafe { self.device.raw.destroy_semaphore(self.raw, None) };

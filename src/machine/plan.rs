@@ -314,7 +314,7 @@ impl Route {
                 let (tracks, keys) = (request.tracks.len(), request.batch().keys(request.set));
                 let are_short = keys <= LONG_TRACK * tracks;
                 let is_held = request.interpolation.wrap().are_held();
-                // All threads share the samples of a piece, but each batch has one.
+                // All threads share the samples of a piece, but one thread evaluates a whole batch.
                 let batches = match cuts_tracks {
                     true => tracks + keys / PART_INTERVALS,
                     false => tracks,

@@ -89,7 +89,8 @@ impl PackedSegments {
     #[inline(always)]
     fn rows<const ROWS: usize>(&self, row: usize) -> &Polynomial<ROWS> {
         let rows = self.0[row..row + ROWS].first_chunk();
-        // Never the zeros, because the slice has `ROWS` rows; the compiler sees no panic here.
+        // The zeros are never used, because the slice has `ROWS` rows. They are given so that no code for a panic is
+        // compiled.
         rows.unwrap_or(const { &[[0.0; 4]; ROWS] })
     }
 
@@ -120,7 +121,8 @@ pub(crate) fn pack(
         indices.push(index);
         end += index.row_count();
     }
-    // In the same memory: no segment moves to a row behind its own.
+    // The rows are moved within the same memory. This overwrites no row that is still needed, because a segment never
+    // moves towards the end.
     let mut rows: Vec<[f32; 4]> = bytemuck::cast_vec(std::mem::take(polynomials));
     for (index, first) in indices.iter().zip((0..).step_by(POWERS)) {
         rows.copy_within(first..first + index.row_count(), index.row());

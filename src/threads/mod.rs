@@ -171,7 +171,7 @@ impl Threads {
         if rayon::current_thread_index().is_none() {
             return Ok(threads.install(work));
         }
-        // A worker of another pool would take up other work while it waits; a thread does not.
+        // A worker of another pool would start another task while it waits, so a separate thread waits instead.
         thread::scope(|scope| {
             let waiting = thread::Builder::new()
                 .spawn_scoped(scope, || threads.install(work))
@@ -189,7 +189,7 @@ impl Threads {
         if let Some(first) = of_first() {
             return Ok(Arc::clone(&first.threads));
         }
-        // Only for starting threads: no work is done while this is locked.
+        // The lock is held only while threads are started, never while they work.
         let mut forked = lock(&self.forked);
         let there = of_first().or(forked.as_ref().filter(|pool| pool.process == process));
         if let Some(pool) = there {

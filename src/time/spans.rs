@@ -478,7 +478,7 @@ impl Spans {
         let starts = &self.starts[part.spans.clone()];
         let i = interval_at(starts, time, 0);
         let end = starts.get(i + 1).copied().unwrap_or(part.end);
-        // Written out: closures are not always inlined.
+        // Written out without a closure, because closures are not always inlined.
         let is_within = !starts.is_empty() && starts[i] <= time && time < end;
         if !is_within {
             return None;

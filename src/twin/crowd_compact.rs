@@ -39,7 +39,7 @@ pub(crate) fn authored_key(stored: [f32; 4]) -> [f32; 4] {
 #[inline(always)]
 fn scaled_where_long<N: Choice>(stored: [N; 4], factor: N) -> [N; 4] {
     let is_short = norm_squared(stored).at_most(N::all(LONGEST_KEY));
-    // Written out: closures are not always inlined.
+    // Written out without a closure, because closures are not always inlined.
     [
         N::choose(is_short, stored[0], stored[0] * factor),
         N::choose(is_short, stored[1], stored[1] * factor),

@@ -40,7 +40,8 @@ impl WholeInstances {
         } = *arguments;
         let is_rotations = output.values == CrowdValues::Rotations;
         let room = (MAX_WHOLE_JOINTS / joints).min(MAX_WHOLE_POSITIONS / (layers * bases));
-        // Joints of a level are divided among instances by bits, so those of matrices are a power of two.
+        // For matrices, an invocation finds its instance and its joint by operations on bits, without a division.
+        // Therefore the number of instances must be a power of two.
         let is_divided = |instances: &u32| is_rotations || instances.is_power_of_two();
         // The number of iterations of a workgroup over its joints. Rotations are stored immediately. They may begin
         // within a line; then the invocations before them are idle.
@@ -61,7 +62,7 @@ impl WholeInstances {
                 (true, Compact) => Kernel::CrowdCompactWholeRotations,
                 (false, Plain) => Kernel::CrowdPlainWholeMatrices,
                 (false, Any) => Kernel::CrowdWholeMatrices,
-                // It would need 256 registers on AMD's processors: its steps have kernels each.
+                // One kernel for all steps would need 256 registers on AMD's cards, so there is a kernel for each step.
                 (false, Compact) => return None,
             },
             output,

@@ -69,7 +69,7 @@ fn matched<'a>(
     if let Some(reason) = &motion.no_world {
         return Err(refused(format!("{name}: {reason}")));
     }
-    // The first set names the joints of a library of arrays.
+    // A library that was made of arrays has no names of joints until its first set gives them.
     let joints = match library.read()?.joint_names() {
         names if !names.is_empty() && !library.skeleton.is_named() => {
             Cow::Owned(library.skeleton.clone().with_names(names))

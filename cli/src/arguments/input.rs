@@ -96,7 +96,8 @@ impl Inputs {
         let gathered = GatheredInputs::new(&self.paths, &selection)?;
         let paths = gathered.paths();
         self.check_formats(&paths.iter().collect::<Vec<_>>())?;
-        // A thread may read the inputs; warnings about the robot are those of the command.
+        // Read the robot's file now, so that its warnings belong to the command and not to the input that a thread
+        // reads first.
         self.reading.robot()?;
         Ok(gathered)
     }
@@ -878,7 +879,7 @@ fn read_list(list: &Path, is_null_separated: bool) -> Result<Vec<PathBuf>, Failu
     let lines = lines.filter(|line| !line.is_empty());
     let (comments, paths): (Vec<&[u8]>, Vec<&[u8]>) =
         lines.partition(|line| line.starts_with(b"#"));
-    // `ls` prints the names of files that begin so, too.
+    // A list that was written by `ls` may contain names of files that begin with `#`.
     let files = comments.iter().filter(|line| named(line).exists()).count();
     if files > 0 {
         let lines = words::count(files, "line");

@@ -319,7 +319,8 @@ impl DialectArguments {
             LimitRule::Report => "their values are kept (--limits clamp changes them)",
             LimitRule::Refuse => "--limits report keeps their values",
         };
-        // In degrees, a pose that every joint can have is turns outside.
+        // If the file's angles are degrees but are read as radians, even an ordinary pose exceeds its limits by whole
+        // turns.
         let is_circles_away = |excess: &&LimitExcess| excess.unit == "rad" && excess.excess > TAU;
         let doubt = match 2 * excesses.iter().filter(is_circles_away).count() > excesses.len() {
             true => "; by more than a turn: are the file's angles in degrees?",

@@ -230,7 +230,8 @@ impl Arguments {
             box_length: loaded.box_length,
             ..target.motion_options()
         };
-        // A channel of one side may be none of the other, so all channels of joints in a glTF file are replaced.
+        // A joint may have a channel that its partner on the other side does not have. Therefore all channels of joints
+        // in a glTF file are replaced.
         let replaces = self.mirror.is_some() && target.format().supports(Feature::SeveralClips);
         let written = match document {
             Some(document) if is_copy => {

@@ -91,7 +91,7 @@ pub(crate) fn read(
         let cells = text.split(',').map(|cell| cell.trim().parse());
         let row: Option<Vec<f64>> = cells.map(Result::ok).collect();
         let Some(row) = row.filter(|row| row.len() == width) else {
-            // Rows that are surely of the dialect stand before a damaged one.
+            // A damaged row is reported only if enough rows before it certainly belong to the dialect.
             if before < CERTAIN * width || !is_known(&numbers) {
                 return Ok(None);
             }

@@ -39,7 +39,7 @@ pub(crate) fn restore(lists: &mut [Vec<f64>], precision: Precision) -> Option<Fr
     // Exact times may show a rate that rounded ones did not.
     let again = || of(&RateSource::Times(lists, Precision::F64)).and_then(FrameGrid::rate);
     let rate = common.and_then(|common| common.rate().or_else(again));
-    // Sums of a frame time stay where they are.
+    // If each time is a sum of rounded frame times, the times keep their values, and only the rate is returned.
     rate.or_else(|| of_sums(lists).filter(|_| precision == Precision::F32))
 }
 

@@ -113,7 +113,7 @@ pub fn join(clips: &[&Motion], gap: Option<f64>) -> Result<Motion, JoinError> {
         ..first.without_tracks()
     };
     if let Some(robot) = joined.robot.as_mut().filter(|_| clips.len() > 1) {
-        // They are those of the keys of one clip.
+        // The recorded poses of bodies belong to the keys of one clip, so the joined clip has none.
         robot.bodies = None;
     }
     for scalar in 0..first.set.scalar_count() {
@@ -422,7 +422,7 @@ fn push_track(
             Channel::Scale => "scale",
         };
         let channel = format!("the {word} of `{name}`");
-        // Where a clip has no keys, the joint rests.
+        // In a clip without keys for this joint, the joint is in its rest pose.
         let rests: Vec<(f64, Vec3)> = (parts.iter())
             .map(|part| (part.span.0, part.clip.rest(of, track)))
             .collect();

@@ -258,7 +258,7 @@ pub fn standing_axis<P: AsRef<[DVec3]>>(
     });
     axes.sort_by(by_length);
     let [axis, second, _] = axes;
-    // The other axes are those of how it leans.
+    // The components along the other two axes come from leaning. If one of them is large, the upward axis is not clear.
     let is_clear = along(&axis) > 2.0 * along(&second);
     is_clear.then(|| axis * sum.dot(axis).signum())
 }
@@ -270,7 +270,8 @@ fn found(scheme: &Scheme, joint_names: &[String], parents: &[Option<usize>]) -> 
             .position(|joint| without_prefix(joint) == name)
     };
     let mut joints = scheme.names.map(named);
-    // The nearest joint above that has a role must have the next role above that the skeleton has.
+    // A joint is in the right place if, of the joints above it, the nearest one with a role has the role that is
+    // expected: the next higher role that the skeleton has.
     let is_placed = |role: Role| {
         let Some(joint) = joints[role as usize] else {
             return false;

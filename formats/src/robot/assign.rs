@@ -208,7 +208,7 @@ fn scalars_of_robot<'a>(
     if all.iter().any(|(_, keys)| joints.contains(keys.name)) {
         return Ok(all);
     }
-    // The joints of each group, by what stands before their names.
+    // The joints of each group; a group is the joints whose names have the same prefix, such as `action.`.
     let mut groups: BTreeMap<&str, HashSet<&str>> = BTreeMap::new();
     for (_, keys) in &all {
         let mut points = keys.name.match_indices('.');
@@ -225,7 +225,7 @@ fn scalars_of_robot<'a>(
         groups.values().flatten().all(|joint| all.insert(*joint))
     };
     if !is_unambiguous(&groups) {
-        // The actions are what was commanded, and the states what the robot did.
+        // Actions are commands to the robot, states are its measured motion. If the file has both, the states are used.
         groups.retain(|group, _| !group.starts_with("action"));
     }
     if !is_unambiguous(&groups) {
@@ -686,7 +686,7 @@ fn error(
     recorded: &RecordedBodies,
     candidate: &Candidate,
 ) -> Option<f64> {
-    // The rotation of the first body is in the file.
+    // The comparison needs the rotation of the first body, which the file must contain, and at most one free joint.
     (candidate.bodies.first() == Some(&Some(0)) && tree.counts().free < 2).then_some(())?;
     let mut largest: f64 = 0.0;
     for sample in &recorded.samples {

@@ -445,7 +445,8 @@ fn write_track(
             rotation: at(&rotations, key).unwrap_or(Quat::IDENTITY),
             translation: clip.origin(track) + vector(Channel::Translation, key).as_dvec3(),
             scale: vector(Channel::Scale, key),
-            // Clips with scalars are written by samples.
+            // No clip with scalars is written here: such clips are written as samples. Scalars of other clips are
+            // missing in this one.
             scalars: vec![f64::NAN; columns.scalars.len()],
         };
         columns.push(&row, batch);

@@ -32,7 +32,8 @@ impl LastNumbers {
         let (start, decimals) = last_number(line)?;
         let all = &self.decimals[..self.count.min(LINES)];
         let is_shorter = all.len() >= LEAST && all.iter().all(|&other| decimals < other);
-        // A rotation such as `0 0 0 1` is short throughout; where a number is cut, those before it are whole.
+        // In a rotation such as `0 0 0 1` all numbers are short, so the last one is not cut. If it was cut, the numbers
+        // before it have more digits.
         let is_short = |end: usize| {
             let before = last_number(without_separators(&line[..end]))?;
             (before.1 <= decimals).then_some(before.0)

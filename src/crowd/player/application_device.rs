@@ -121,7 +121,7 @@ impl Crowd {
         target: &CrowdTarget,
         commands: vk::CommandBuffer,
     ) -> Result<(), CrowdError> {
-        // SAFETY: promised by the caller.
+        // SAFETY: as the caller promises.
         unsafe { self.record_between(target, commands, CommandScopes::default()) }
     }
 
@@ -152,7 +152,7 @@ impl Crowd {
             });
         }
         if instances > 0 {
-            // SAFETY: promised by the caller.
+            // SAFETY: as the caller promises.
             let commands = unsafe { Commands::new(&device.engine.device, commands) };
             let layers = self.layer_count();
             let commands = commands.between(scopes.with_earlier_recordings());

@@ -189,7 +189,7 @@ impl CompactGroups {
                 let step = random.step();
                 *key = random.near(*key, step);
             }
-            // Some have another sign than they were added with.
+            // Some keys are multiplied by 4, as keys that were added with the opposite sign.
             key.map(|key| match random.once_in(3) {
                 true => key.map(|component| component * 4.0),
                 false => key,

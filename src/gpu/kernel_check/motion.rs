@@ -89,7 +89,8 @@ fn joints(random: &mut Random, moves: u32) -> Trial {
             },
         }
     };
-    // Rotations for all forms: those of a curve have the room of polynomials.
+    // The cells contain rotations for all forms. Every channel gets as many cells as polynomials need, which need the
+    // most.
     let room = SPANS * COUNT * POWERS as u32;
     let cells: Vec<[f32; 4]> = (0..room + 4).map(|_| random.rotation()).collect();
     let channel = |random: &mut Random, kind: u32| {
@@ -116,7 +117,7 @@ fn joints(random: &mut Random, moves: u32) -> Trial {
     let channels: Vec<CrowdChannel> = (0..channels)
         .map(|index| channel(random, index % CHANNELS))
         .collect();
-    // Some at keys, some behind the end.
+    // Some samples are at keys, some after the end.
     let sample = |random: &mut Random| MotionSample {
         clip: random.below(2),
         tick: match random.once_in(3) {

@@ -33,7 +33,8 @@ pub(super) fn trials(kernel: Kernel, random: &mut Random) -> Vec<Trial> {
         kernel,
         Kernel::CrowdSubgroupRotations | Kernel::CrowdSubgroupRotationsF16
     ) {
-        // Two instances with two time bases, and one of them, for subgroups with the fewest lanes.
+        // Subgroups evaluate two instances or one, each with two time bases; one is for subgroups with the fewest
+        // lanes.
         return [2, 1]
             .map(|instances| of_subgroups(random, instances))
             .into();

@@ -187,7 +187,7 @@ mod tests {
         families[0].queue_count = 1;
         families.extend(video);
         assert_eq!(copy_queue(&families, 0), None);
-        // The family that computes need not be the first.
+        // The compute family here is 2, which is not the first one.
         let families = card("RTX 4060").families;
         assert_eq!(copy_queue(&families, 2), queue(1, 0));
     }

@@ -213,7 +213,8 @@ impl PlotSource<'_> {
             .flat_map(|curve| curve.pieces.iter().flatten());
         let shown = shown.chain(dots.iter().flat_map(|dots| &dots.points));
         let range = range_of(shown.map(|point| point.1));
-        // A name tells a joint; dimensions count the components of boxes without names.
+        // The title has the name of the track. If boxes have no names, the title has the number of the dimension
+        // instead, which counts the components of all boxes.
         let (name, is_named) = (self.box_name(index), has_name(self.set, index));
         let (title, label) = match components {
             [one] if is_named => (format!("{} of {name}", NAMES[*one]), NAMES[*one]),

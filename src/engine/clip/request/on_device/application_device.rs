@@ -183,7 +183,7 @@ impl TimedTarget {
         offset: u64,
         times: &[f64],
     ) -> Result<(), Error> {
-        // SAFETY: promised by the caller.
+        // SAFETY: as the caller promises.
         unsafe { self.record_between(commands, offset, times, CommandScopes::default()) }
     }
 
@@ -202,7 +202,7 @@ impl TimedTarget {
         times: &[f64],
         scopes: CommandScopes,
     ) -> Result<(), Error> {
-        // SAFETY: promised by the caller.
+        // SAFETY: as the caller promises.
         let commands = unsafe { Commands::new(&self.clip.engine().device, commands) };
         let commands = commands.between(scopes.with_earlier_recordings());
         Ok(self.clip.record_at(commands, offset, times)?)
