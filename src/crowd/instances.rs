@@ -206,7 +206,7 @@ mod tests {
     use super::*;
     use crate::twin::crowd_entries::scatter;
 
-    /// Applies a frame as a device does; the bytes that it takes for it.
+    /// Applies a frame as a device does, and returns the number of bytes that are uploaded for it.
     fn applied(all: &mut Instances, known: &mut [CrowdEntry]) -> usize {
         match all.take_frame(2).changes {
             EntryChanges::None => 0,

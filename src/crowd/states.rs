@@ -216,7 +216,8 @@ impl MotionTables {
             && self.clips.iter().enumerate().all(is_sound_clip)
     }
 
-    /// The tables of some clips alone, each once, in this order, with their spans and cells. They give the same states.
+    /// Makes tables that have only some of the clips, in this order, with their spans and cells. They give the same
+    /// states.
     ///
     /// # Errors
     /// * When a clip does not exist or is listed twice.
@@ -778,7 +779,7 @@ fn canonical3<N: Number>([x, y, z]: [N; 3]) -> [N; 3] {
 }
 
 impl<N: Number> Joint<N> {
-    /// The joint's state in the world, of that in its parent's frame.
+    /// Converts the joint's state from its parent's frame to the world; `parent` is the parent's state in the world.
     #[inline(always)]
     fn hung_on(self, parent: &Self, moves: bool) -> Self {
         let arm = rotated(parent.rotation, self.position);
@@ -840,7 +841,7 @@ struct StatesTask<'a, 'b> {
     memory: &'b mut StateScratch,
 }
 
-/// Which values of a pose are computed.
+/// The values of a pose that are computed.
 #[derive(Clone, Copy, PartialEq, PartialOrd)]
 pub(super) enum PoseValues {
     /// Rotations in the parents' frames.

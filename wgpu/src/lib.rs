@@ -78,8 +78,8 @@ pub fn handles(device: &wgpu::Device) -> Result<VulkanHandles, NotVulkan> {
 
 /// Creates a buffer of zeros for results, with the usages that Tumble needs (`STORAGE` and `COPY_DST`) and `usage`.
 ///
-/// wgpu fills a buffer with zeros before the first use that it knows of, which would be after Tumble has written it. This
-/// buffer is filled and submitted here, so wgpu leaves it alone.
+/// wgpu fills a buffer with zeros before the first use that it knows of, which would be after Tumble has written it.
+/// This buffer is filled and submitted here, so wgpu does not fill it later.
 #[must_use]
 pub fn buffer(
     device: &wgpu::Device,
