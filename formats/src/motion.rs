@@ -451,9 +451,9 @@ pub struct SampledClip<'a> {
     pub rate: Option<FrameRate>,
     /// Unit quaternions with continued signs: each is nearer to the one before in its track than its negative.
     pub rotations: &'a [Quat],
-    /// Translations of all tracks; empty where no track has any.
+    /// Translations of all tracks; empty if no track has any.
     pub translations: &'a [Vec3],
-    /// Scales of all tracks; empty where no track has any.
+    /// Scales of all tracks; empty if no track has any.
     pub scales: &'a [Vec3],
     /// All scalars of the clip, in the order `[sample][scalar]`.
     pub scalars: &'a [f32],

@@ -106,7 +106,7 @@ pub struct RetargetReport {
     /// How far hands and feet come away from where the source's are, relative to the hips and to the height of the hips: by
     /// the names of the target's joints. Empty where a skeleton is not recognised.
     pub ends: Vec<(String, f64)>,
-    /// How far a foot of the target comes below the lowest joint at rest, in the target's unit; 0 where it does not, or
+    /// How far a foot of the target comes below the lowest joint at rest, in the target's unit; 0 if it does not, or
     /// where the skeleton is not recognised.
     pub below_ground: f64,
 }
@@ -619,7 +619,7 @@ impl Ends {
 }
 
 /// The axes of a skeleton by where its parts are at rest: its left, up and forward as columns, each along an axis of the
-/// coordinates. `None` where they are not told apart.
+/// coordinates. `None` if they are not told apart.
 fn axes_of(rig: &Rig<'_>, roles: &Roles) -> Option<DQuat> {
     let at = |role| roles.joint(role).map(|joint| rig.rest.positions[joint]);
     let up = nearest_axis(at(Role::Head)? - at(Role::Hips)?)?;

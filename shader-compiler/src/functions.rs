@@ -1,5 +1,6 @@
-//! The shaders' arithmetic as Rust: one more back end of naga's representation, for functions that compute values from
-//! values. Rust's operations are the shader's, one by one and in its order, so both round alike. Names of `let` stay.
+//! The shaders' arithmetic as Rust: another back end for naga's representation, for functions that compute values from
+//! values. Each operation of the shader becomes one in Rust, in the same order, so both round in the same way. Names of
+//! `let` are kept.
 //!
 //! A function is written in the first of these forms that its operations allow:
 //! * for any `N: Number`, a number or a vector with the numbers of several samples, or where the list asks for it any
@@ -606,8 +607,8 @@ impl<'a> Writer<'a> {
         )
     }
 
-    /// The function as what comes before a cut and what comes after it. The first part takes the parameters that it
-    /// uses, the second one the others, and what it needs of the first.
+    /// The function in two parts, before and after a cut. The first part takes the parameters that it uses. The second
+    /// part takes the other parameters, and the values of the first part that it needs.
     fn parts(
         &self,
         name: &str,
@@ -781,7 +782,7 @@ impl<'a> Writer<'a> {
         Ok(true)
     }
 
-    /// A block between braces: what gets a name in it has none behind it.
+    /// A block between braces; names that are given inside are not known after it.
     fn inside(&mut self, block: &Block, is_last: bool) -> Result<String> {
         let named = self.named.clone();
         let outside = std::mem::take(&mut self.lines);
@@ -1418,7 +1419,7 @@ pub(crate) fn binary(op: BinaryOperator, is_float: bool, left: Text, right: Text
     })
 }
 
-/// Removes what no later line uses.
+/// Removes lines whose value no later line uses.
 fn prune(lines: &mut Vec<Line>) {
     for i in (0..lines.len()).rev() {
         if let Line::Let(name, _) = &lines[i]

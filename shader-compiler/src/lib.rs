@@ -39,8 +39,8 @@ use table::{CONVERTING_STORE, Kernel, WIDE_STORE};
 /// The engine's package.
 const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
 
-/// Compiles the shaders, writes the files that are not as they should be, each whole or not at all,
-/// and says which.
+/// Compiles the shaders, writes the files whose content differs (each completely or not at all), and prints their
+/// names.
 ///
 /// # Panics
 /// With a message about the shader that cannot be read, is broken or inexact, or declares what
@@ -60,7 +60,7 @@ pub fn write() {
     }
 }
 
-/// The files that are checked in: their paths from the engine's root, and what belongs into them.
+/// The files that are checked in: their paths from the engine's root, and their content.
 type Files = Vec<(&'static str, Vec<u8>)>;
 
 /// Compiles the shaders.
@@ -307,7 +307,7 @@ impl Module {
         arguments.any(|argument| argument.binding == lane)
     }
 
-    /// Its SPIR-V, which rounds as it is written.
+    /// Its SPIR-V after the exactness pass.
     fn spirv(&self) -> Vec<u32> {
         let Self {
             name,

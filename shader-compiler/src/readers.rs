@@ -84,7 +84,7 @@ fn output(binding: usize) -> String {
 enum Field {
     Scalar(ScalarKind),
     Vector(ScalarKind),
-    /// An array of so many vectors of four f32.
+    /// An array of this many vectors of four f32.
     Vectors(u32),
 }
 

@@ -1,7 +1,7 @@
-//! Rows of kept clips with few samples between keys, as keys at 30 Hz have at 60 frames a second. The samples of such a
-//! row, their intervals and parameters, are found once for all tracks in succession with the same key times: to find
-//! them takes longer than to evaluate them. Arcs are computed from their keys again, in a lane for each interval, which
-//! takes less time than to read them from memory.
+//! Rows of kept clips with few samples between keys, for example keys at 30 Hz that are evaluated at 60 frames a
+//! second. Finding the interval and the parameter of each sample takes longer than evaluating it. Therefore this is
+//! done once for all consecutive tracks with the same key times. Arcs are computed again from their keys, with a lane
+//! for each interval, because reading their segments from memory would take longer.
 
 use std::ops::Range;
 

@@ -1,7 +1,7 @@
-//! Frames of a track straight from its keys: a lane for each interval between two keys that contains samples. The
-//! curve of an interval is made once for all of its samples, and stays in registers while these are evaluated and
-//! stored. Which samples an interval has, their parameters and the weights of tangents depend on key times alone, and
-//! are kept for the following tracks with the same times.
+//! Frames of a track, computed directly from its keys: there is a lane for each interval between two keys that contains
+//! samples. The curve of an interval is made once for all of its samples, and stays in registers while these are
+//! evaluated and stored. The samples of an interval, their parameters and the weights of tangents depend only on the
+//! key times. Therefore they are kept for the following tracks with the same times.
 
 use std::ops::Range;
 
@@ -196,7 +196,7 @@ impl IntervalLanes {
         }
     }
 
-    /// Sets what follows from all lanes.
+    /// Sets the fields that are computed from all lanes.
     fn finish(&mut self, curve: KeyCurve) {
         let beside = curve.beside();
         let is_in_order = |keys: &[u32; MAX_LANES]| {
@@ -345,7 +345,7 @@ impl VectorAt<'_> {
         ]
     }
 
-    /// The parameter of each interval's sample `i`; any where it has fewer.
+    /// The parameter of each interval's sample `i`; any number for intervals with fewer samples.
     #[inline(always)]
     fn parameters<L: Lanes>(self, plan: &IntervalPlan, i: usize) -> L {
         let i = i.min(self.lanes.max_count - 1);

@@ -68,7 +68,8 @@ const REST_BYTES: usize =
     size_of::<PolynomialSegment>() + size_of::<f64>() + size_of::<StoredSource>();
 
 impl KeptKeys {
-    /// Keeps the keys of a set if its curves can be computed from them, in at most so many bytes; `None` otherwise.
+    /// Keeps the keys of a set if its curves can be computed from them, and if all takes at most `bytes` bytes; `None`
+    /// otherwise.
     pub(crate) fn new(
         set: &TrackSet,
         interpolation: Interpolation,

@@ -140,7 +140,7 @@ impl Buffer {
         Ok(buffer)
     }
 
-    /// Imports pages of this process's memory; `None` where the device cannot.
+    /// Imports pages of this process's memory; `None` if the device cannot.
     ///
     /// # Safety
     /// The pages must stay allocated until the buffer is dropped and no submitted work uses it.

@@ -393,7 +393,7 @@ impl CrowdReader {
         })
     }
 
-    /// Whether the reader is for this output and has room for so many instances.
+    /// Whether the reader is for this output and has room for `instances` instances.
     fn fits(&self, output: CrowdOutput, instances: u32) -> bool {
         self.target.output == output && self.target.room >= instances
     }
@@ -442,7 +442,7 @@ mod tests {
     use crate::shader::Kernel;
     use crate::tracks::set::TrackSet;
 
-    /// An instance of so many joints, each with a time base if there are many.
+    /// A crowd whose skeleton has `joints` joints; with `has_many_bases`, each joint has its time base.
     fn crowd(mapping: Mapping, joints: usize, layers: usize, has_many_bases: bool) -> Vec<Crowd> {
         let skeleton = Skeleton::chain(joints, 1.0).unwrap();
         let mut library = CrowdLibrary::new(&skeleton).unwrap();

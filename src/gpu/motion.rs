@@ -25,7 +25,8 @@ use crate::threads::exclusive::Exclusive;
 use crate::threads::stop;
 use crate::work::motion::{StatesResources, StatesShape, TreeResources, record_window};
 
-/// Windows begin at multiples of so many instances. Their arrays then begin where kernels can bind them.
+/// Windows begin at multiples of this number of instances, so that their arrays begin at offsets at which kernels can
+/// bind them.
 const LEAST_WINDOW: u64 = 64;
 
 /// The size of a window's states: on a software device they stay in the processor's cache.
@@ -391,7 +392,7 @@ impl ResidentMotions {
         Ok(())
     }
 
-    /// Submits a window of instances. The last one ends with what makes the result known to its readers.
+    /// Submits a window of instances. After the last window, the commands make the result visible to its readers.
     fn submit(
         &self,
         work: &mut StatesWork,

@@ -101,7 +101,8 @@ impl Parts<'_> {
         Ok(weights)
     }
 
-    /// The layers of a blend one after another: where they are, or copied into a buffer.
+    /// A range in which the layers of a blend follow each other: the layers' memory if it has this form, or else a
+    /// buffer into which they are copied.
     fn layers(&mut self, layers: &[VulkanBuffer], size: u64) -> Result<Slice, VulkanError> {
         let all = size.saturating_mul(layers.len() as u64);
         self.check("the layers of a blend", all)?;

@@ -130,7 +130,7 @@ impl Submission {
         Ok(())
     }
 
-    /// Records the work, behind what was recorded directly, and submits it to the queue.
+    /// Records the work, after the commands that were recorded directly, and submits it to the queue.
     pub(crate) fn submit(&mut self) -> Result<(), VulkanError> {
         self.submit_between(None, None)
     }

@@ -33,10 +33,10 @@ pub(crate) struct Limits {
     pub(crate) memory: Option<usize>,
     /// Bytes of segments that go into one buffer of a device; `None` on the CPU.
     pub(crate) group_bytes: Option<usize>,
-    /// With at least so many keys, the device prepares the arcs between them; `None` if the host always does.
+    /// With at least this many keys, the device prepares the arcs between them; `None` if the host always does.
     pub(crate) prepares_arcs_from: Option<usize>,
-    /// With more bytes of segments, a clip keeps keys alone where its samples can be computed from them; `None` if
-    /// clips always keep segments.
+    /// If its segments take more bytes than this, a clip keeps only its keys, if samples can be computed from them;
+    /// `None` if clips always keep segments.
     pub(crate) kept_segments: Option<usize>,
 }
 
@@ -62,7 +62,7 @@ impl Limits {
         !cfg!(smallest) && matches!(self.kind, MachineKind::Cpu { .. })
     }
 
-    /// Whether a device prepares the arcs between so many keys.
+    /// Whether a device prepares the arcs between this number of keys.
     pub(crate) fn prepares_arcs(&self, keys: usize) -> bool {
         self.prepares_arcs_from.is_some_and(|from| keys >= from)
     }
@@ -175,7 +175,7 @@ const MIN_KEYS: usize = 256;
 const KEYS_TO_CUT: usize = 8;
 
 impl Plan {
-    /// Decides how a request is evaluated; with `chunk`, as a stream in chunks of so many values.
+    /// Decides how a request is evaluated; with `chunk`, as a stream in chunks of about `chunk` values.
     pub(crate) fn of(
         request: &SetRequest<'_>,
         layout: Layout,

@@ -59,7 +59,7 @@ pub(crate) fn refuse_more_than_there_is<T>(
 }
 
 /// The memory in bytes that this process can still get without swap space: the memory that the system has free or can
-/// free; in a container at most the rest of its limit. `None` where the system does not say, such as in a browser.
+/// free; in a container at most the rest of its limit. `None` if the system does not say, such as in a browser.
 ///
 /// Allocations of 256 MiB and more are refused with an [`OutOfMemoryError`] if less than they need is available, swap
 /// space included. Systems may promise memory that they do not have, and then end the process that uses it.

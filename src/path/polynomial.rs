@@ -59,7 +59,8 @@ impl Polynomial {
         (zeros, rest)
     }
 
-    /// A zero from 0 to 1: the least of the lengths at the ends and where they have a minimum.
+    /// The parameter from 0 to 1 at which the polynomial is shortest, if its length there is at most `tolerance`; both
+    /// ends and the minima between them are compared.
     fn zero(&self, tolerance: f64) -> Option<f64> {
         // If all Bernstein coefficients are on one side of a plane, the curve is on this side, too.
         let [c0, c1, c2, c3] = self.0;

@@ -30,7 +30,8 @@ use crate::tracks::set::vectors::{Channel, VectorTrack};
 /// The number of tracks whose vectors are prepared as one piece of work.
 const VECTOR_BATCH: usize = 256;
 
-/// The number of tracks from which it pays to find the samples of their times once for all of them.
+/// With at least this many consecutive tracks with the same times, it is faster to find their samples once for all of
+/// them.
 const ALIKE: usize = 4;
 
 /// The prepared tracks on the host, from which the work of every device is computed.

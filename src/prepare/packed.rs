@@ -9,8 +9,9 @@ use crate::time::spans::{SOURCE_INDEX, SpanSource, StoredSource};
 use crate::twin::Evaluate as _;
 use crate::twin::evaluate_polynomial::Polynomial;
 
-/// The rows of some packed segments, one segment behind the other. A slice, not a struct with one: where a function takes
-/// a reference to it, the compiler knows that stores to the output change no coefficient, and keeps them in registers.
+/// The rows of some packed segments, one segment after the other. It is an unsized type around a slice, not a struct
+/// that refers to a slice: if a function takes a reference to it, the compiler knows that stores to the output change
+/// no coefficient, and keeps the coefficients in registers.
 #[derive(TransparentWrapper)]
 #[repr(transparent)]
 pub(crate) struct PackedSegments([[f32; 4]]);
@@ -101,9 +102,8 @@ impl PackedSegments {
     }
 }
 
-/// Packs polynomials, which are all fitted and divided, and changes the indices in the sources of their spans; returns the
-/// rows. Polynomials that are so many that an index has no room for their rows, and those for which there is no memory to
-/// pack them, stay as they are.
+/// Packs polynomials, after all of them are fitted and divided, and changes the indices in the sources of their spans;
+/// returns the rows. Nothing is packed if an index has too few bits for so many rows, or if there is not enough memory.
 pub(crate) fn pack(
     polynomials: &mut Vec<PolynomialSegment>,
     sources: &mut [StoredSource],

@@ -414,7 +414,7 @@ impl SetRequest<'_> {
         of_batch.start.max(self.samples.start).min(end)..end
     }
 
-    /// Refuses what cannot be interpolated as requested, also where no sample needs it.
+    /// Refuses tracks that cannot be interpolated as requested, also if the fault is at keys that no sample needs.
     pub(crate) fn check(&self) -> Result<(), InterpolationError> {
         self.interpolation.check_wraps()?;
         self.tracks.clone().try_for_each(|track| {

@@ -86,7 +86,8 @@ impl Prepared {
         self.spans.try_reserve_exact(keys).map_err(refused)
     }
 
-    /// Removes what only whole tracks need, so that the curves and their spans remain, in no more memory than these take.
+    /// Removes the data that only whole tracks need. The curves and their spans remain, in no more memory than they
+    /// need.
     pub(crate) fn keep_curves(&mut self) {
         if !(self.spans.sources.iter())
             .any(|source| matches!(source.source(), SpanSource::Constant(_)))
@@ -172,7 +173,7 @@ impl Prepared {
         Some(first)
     }
 
-    /// Moves all of `other` behind what it has.
+    /// Appends all of `other`.
     fn append(&mut self, other: Self) {
         let constants = self.constants.len() as u32;
         let segments = self.segments.len() as u32;

@@ -62,7 +62,7 @@ pub(crate) struct KernelCode {
     pub(crate) subgroups: bool,
 }
 
-/// The variants of kernels that a device takes where they are.
+/// The variants of kernels that a device uses if they exist.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Variants {
     /// Whether to use the variants that read texel buffers.

@@ -25,7 +25,7 @@ pub(crate) struct WholeInstances {
 }
 
 impl WholeInstances {
-    /// `None` where an instance is too large for a workgroup's memory.
+    /// `None` if an instance is too large for a workgroup's memory.
     pub(crate) fn new(
         arguments: &CrowdDispatch,
         output: CrowdOutput,
@@ -71,7 +71,7 @@ impl WholeInstances {
     }
 
     /// The arguments of a dispatch over as many instances as `arguments` counts, and how many workgroups it has.
-    /// `levels` says where the levels of the skeleton begin among the links, and where they end.
+    /// `levels` has the index of the first link of each level of the skeleton, and the end of the last level.
     pub(crate) fn dispatch(
         &self,
         arguments: CrowdDispatch,
@@ -101,7 +101,8 @@ impl WholeInstances {
     }
 }
 
-/// The factor by which kernels divide joints among instances of so many joints: 2^20 divided by their number, rounded up.
+/// The factor with which kernels compute the instance of a joint index by a multiplication: 2^20 divided by the number
+/// of joints of an instance, rounded up.
 pub(crate) fn joint_share(joints: u32) -> u32 {
     const SHARE_BITS: u32 = 20;
     (1u32 << SHARE_BITS).div_ceil(joints)

@@ -562,7 +562,7 @@ impl CommandLine {
         self.refuse(&options, on, remedy)
     }
 
-    /// Refuses the options of curves through rotations where there are none.
+    /// Refuses the options of curves through rotations if there are none.
     pub(crate) fn refuse_rotation_options(&self, on: &str) -> Result<(), Failure> {
         let remedy = "it is for rotations; leave it out, or see --path-frame and --path-method";
         self.refuse(&[("methods", "--method")], on, remedy)?;
@@ -640,7 +640,7 @@ pub(crate) struct OptionFile {
     pub(crate) sha256: String,
 }
 
-/// The hash of a file; empty where it cannot be read again, as standard input. That of the models in a folder of
+/// The hash of a file; empty if it cannot be read again, as standard input. That of the models in a folder of
 /// body models.
 pub(crate) fn content(file: &str) -> String {
     if Path::new(file).is_dir() {

@@ -134,7 +134,7 @@ pub(crate) struct RobotReport {
     /// The names of the joints, in the order of the result.
     joints: Vec<String>,
     joint_order: &'static str,
-    /// The names of the bodies; absent where the dialect has none.
+    /// The names of the bodies; absent if the dialect has none.
     #[serde(skip_serializing_if = "Option::is_none")]
     bodies: Option<Vec<String>>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -143,7 +143,7 @@ pub(crate) struct RobotReport {
     #[serde(skip_serializing_if = "Vec::is_empty")]
     merged_bodies: Vec<String>,
     siblings: &'static str,
-    /// The order of quaternions; absent where the dialect has none.
+    /// The order of quaternions; absent if the dialect has none.
     #[serde(skip_serializing_if = "Option::is_none")]
     quaternion: Option<&'static str>,
     velocities: &'static str,

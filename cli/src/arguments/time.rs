@@ -131,7 +131,7 @@ pub(crate) enum SampleChoice {
         rate: RateChoice,
         start: Option<f64>,
         end: Option<f64>,
-        /// Start at 0 where the first key is later.
+        /// Start at 0 if the first key is later.
         from_zero: bool,
     },
     Times(Vec<f64>),

@@ -36,7 +36,7 @@ impl Digest {
 /// before and after reading, so that the hash is that of the evaluated bytes.
 pub(crate) struct InputFile {
     path: PathBuf,
-    /// Its identity before reading; `None` where it cannot be read twice, as standard input and pipes.
+    /// Its identity before reading; `None` if it cannot be read twice, as standard input and pipes.
     before: Option<Identity>,
     /// The files that it refers to, relative to its folder, with their identities.
     referred: Vec<(PathBuf, Option<Identity>)>,
@@ -71,7 +71,7 @@ impl InputFile {
         &self.path
     }
 
-    /// Its length with that of the files that it refers to; `None` where it cannot be read twice.
+    /// Its length with that of the files that it refers to; `None` if it cannot be read twice.
     pub(crate) fn bytes(&self) -> Option<u64> {
         let others = self
             .referred

@@ -79,7 +79,7 @@ pub(crate) struct InputEntry {
     pub(crate) state: InputState,
     /// As on the command line.
     pub(crate) input: String,
-    /// The result that it has, or would have; `None` where it can have no name.
+    /// The result that it has, or would have; `None` if it can have no name.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) result: Option<String>,
     /// The exit code of a command that has this input alone.
@@ -160,7 +160,7 @@ impl InputEntry {
         }
     }
 
-    /// The entry in a line; `None` where there is none, or where it names a result outside its directory.
+    /// The entry in a line; `None` if there is none, or where it names a result outside its directory.
     pub(crate) fn of_line(line: &[u8]) -> Option<Self> {
         let entry: Self = serde_json::from_slice(line).ok()?;
         entry
@@ -202,7 +202,7 @@ impl InputEntry {
 pub(crate) type InputEntries = BTreeMap<String, InputEntry>;
 
 impl ManifestEntry {
-    /// The entry in a line; `None` where there is none, or where it names a result outside its directory.
+    /// The entry in a line; `None` if there is none, or where it names a result outside its directory.
     pub(crate) fn of_line(line: &[u8]) -> Option<Self> {
         let mut entry: Self = serde_json::from_slice(line).ok()?;
         if let Cow::Owned(options) = with_present_names(&entry.options) {
@@ -375,7 +375,7 @@ impl ManifestLines {
     }
 }
 
-/// Opens the manifest of a directory; `None` where there is none.
+/// Opens the manifest of a directory; `None` if there is none.
 ///
 /// # Errors
 /// When it is a link, not a regular file, or not a manifest.

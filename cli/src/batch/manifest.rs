@@ -141,7 +141,7 @@ pub(crate) struct ManifestOptions {
     pub(crate) prune: bool,
 }
 
-/// Locks a directory of results; `None` where the system or the file system has no such locks.
+/// Locks a directory of results; `None` if the system or the file system has no such locks.
 pub(crate) fn lock(folder: &Folder) -> Result<Option<File>, Failure> {
     let Ok(file) = folder.to_lock() else {
         return Ok(None);

@@ -98,7 +98,7 @@ pub(crate) struct ClipWork {
 }
 
 impl ClipWork {
-    /// ` (1.2 MB → 860.0 kB)`: the bytes of the input with its files, and of the result; nothing where the input's are
+    /// ` (1.2 MB → 860.0 kB)`: the bytes of the input with its files, and of the result; nothing if the input's are
     /// not known.
     pub(crate) fn sizes(&self, written: &WrittenFile) -> String {
         let size = |bytes: u64| words::bytes(bytes as f64);
@@ -189,7 +189,7 @@ enum InputSource {
 /// A job whose input was read.
 struct ReadJob {
     job: PipelineJob,
-    /// `None` where its result exists and is complete.
+    /// `None` if its result exists and is complete.
     input: Option<(InputFile, Result<Loaded, Failure>)>,
 }
 

@@ -265,7 +265,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
 }
 
-/// Facts in a line; `None` where there are none.
+/// Facts in a line; `None` if there are none.
 fn joined(facts: impl IntoIterator<Item = Option<String>>) -> Option<String> {
     let facts: Vec<String> = facts.into_iter().flatten().collect();
     (!facts.is_empty()).then(|| facts.join(", "))
@@ -300,7 +300,7 @@ impl Remedies {
         }
     }
 
-    /// `tumble features … --resume makes them again`; `None` where that would not help. The verb is that of one command,
+    /// `tumble features … --resume makes them again`; `None` if that would not help. The verb is that of one command,
     /// and of several.
     fn resume(&self, more: &str, verbs: [&str; 2], again: &str) -> Option<String> {
         let helps = self.is_known && !self.has_damaged_lines;

@@ -13,7 +13,7 @@ use crate::format::Space;
 pub(super) struct CaptureHeading {
     /// The name of each column.
     pub(super) names: Vec<String>,
-    /// The rate of frames that are counted; `None` where each row has its time.
+    /// The rate of frames that are counted; `None` if each row has its time.
     pub(super) rate: Option<FrameRate>,
     /// The unit that the file states, and the up axis that its program has by default.
     pub(super) space: Space,

@@ -22,7 +22,7 @@ pub(super) struct Morphs {
 #[derive(Default)]
 struct MeshTargets {
     count: usize,
-    /// Their names in its extras; empty where it has none, or repeats one. There may be fewer than targets.
+    /// Their names in its extras; empty if it has none, or repeats one. There may be fewer than targets.
     names: Vec<String>,
 }
 

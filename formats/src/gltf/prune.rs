@@ -660,7 +660,7 @@ impl<'a> Layout<'a> {
     }
 }
 
-/// The bytes of an accessor in its buffer; `None` where they are not known.
+/// The bytes of an accessor in its buffer; `None` if they are not known.
 fn span_of(raw: &RawValue, view: &BufferView<'_>) -> Option<Range<u64>> {
     let accessor: Accessor = serde_json::from_str(raw.get()).ok()?;
     let component = match accessor.component_type {

@@ -30,7 +30,7 @@ struct ListedOrder(BodyOrder, Siblings);
 
 /// How the joints and bodies of a file may belong to those of a robot.
 struct Candidate {
-    /// `None` where names say it.
+    /// `None` if names say it.
     listed: Option<ListedOrder>,
     /// The joint of each scalar, as [`Tree::scalar_joints`] counts them.
     joints: Vec<usize>,

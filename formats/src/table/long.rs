@@ -336,7 +336,7 @@ struct RowNumbers {
     rotation: Quat,
     translation: DVec3,
     scale: Vec3,
-    /// NaN where the clip has none.
+    /// NaN if the clip has none.
     scalars: Vec<f64>,
 }
 

@@ -39,7 +39,7 @@ pub struct Crowd {
     pub(crate) instances: Instances,
     /// The push constants that all dispatches share.
     arguments: CrowdDispatch,
-    /// The crowd on the engine's machine; `None` where the host evaluates it.
+    /// The crowd on the engine's machine; `None` if the host evaluates it.
     pub(crate) device: Option<Box<dyn MachineCrowd>>,
     /// The submission whose result was not taken yet.
     submitted: Option<Submitted>,
@@ -107,7 +107,7 @@ impl Engine {
 }
 
 impl Crowd {
-    /// The tables on the engine's machine; `None` where the host evaluates.
+    /// The tables on the engine's machine; `None` if the host evaluates.
     fn uploaded(&self) -> Result<Option<Box<dyn MachineCrowd>>, CrowdError> {
         let (library, tables) = (&self.library, &self.library.tables);
         Ok(self.engine.machine.crowd(&CrowdSource {

@@ -27,7 +27,7 @@ pub(super) fn prepared_from(option: PrepareArcs, kind: DeviceKind) -> usize {
 }
 
 impl VulkanEngine {
-    /// Whether the arcs between so many keys are prepared on the device.
+    /// Whether the device prepares the arcs between `keys` keys.
     pub(crate) fn prepares_arcs(&self, keys: usize) -> bool {
         self.prepares_arcs_from < usize::MAX && keys >= self.prepares_arcs_from
     }

@@ -30,7 +30,7 @@ pub struct EngineChoices {
     pub read_back: &'static str,
     /// `direct`, `small-direct` or `host`: the default of uploads to the device.
     pub uploads: &'static str,
-    /// The number of keys from which on the device prepares the arcs of a clip; `None` where the host always does.
+    /// The number of keys from which on the device prepares the arcs of a clip; `None` if the host always does.
     pub arcs_prepared_from: Option<usize>,
     /// Whether kernels write into the caller's memory, which is imported.
     pub imports_memory: bool,

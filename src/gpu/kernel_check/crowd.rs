@@ -335,7 +335,7 @@ fn walk(random: &mut Random) -> Trial {
 pub(super) const LEVELS: [&[[u32; 2]]; 3] =
     [&[[1, 0], [2, 0]], &[[6, 1]], &[[3, 2], [5, 6], [4, 6]]];
 
-/// These links, and behind them where each level begins and ends, from an index on.
+/// These links, followed by the first and the last index of each level.
 pub(super) fn links_of_levels() -> (Vec<CrowdLink>, u32) {
     let link = |[joint, parent]: [u32; 2]| CrowdLink { joint, parent };
     let mut links: Vec<_> = LEVELS.concat().into_iter().map(link).collect();

@@ -31,7 +31,7 @@ pub(super) fn trials(kernel: Kernel, random: &mut Random) -> Vec<Trial> {
     }
 }
 
-/// States of so many samples: unit rotations, positions and velocities.
+/// States of `samples` samples: unit rotations, positions and velocities.
 fn states(random: &mut Random, samples: u32) -> Vec<[f32; 4]> {
     let state = |random: &mut Random| {
         let [local, world] = random.pair();
@@ -183,7 +183,7 @@ fn stored(random: &mut Random) -> Trial {
     Trial::new([bytes(&states)], &dispatch, groups(count as usize, false))
 }
 
-/// Matrices of rotations in the world, or so many numbers of them.
+/// Matrices of rotations in the world, or the first `numbers` numbers of each.
 fn matrices(random: &mut Random, numbers: u32, detail: u32) -> Trial {
     let count = INSTANCES * JOINTS;
     let dispatch = MotionDispatch {

@@ -21,8 +21,8 @@ use super::crowd::{
 use super::random::Random;
 use super::{Trial, bytes};
 
-/// Instances of the window, and those of a workgroup: a power of two, and so many that an invocation has several joints,
-/// and several time bases.
+/// Instances of the window, and of a workgroup. The latter are a power of two, and enough that an invocation has
+/// several joints and several time bases.
 const INSTANCES: u32 = 38;
 const OF_WORKGROUP: u32 = 16;
 const CLOCK: u64 = 0x00ab_cdef_0123_4567;
@@ -94,7 +94,7 @@ const SMALL: Size = Size {
     cells: CELLS,
 };
 
-/// So many joints that a lane has several, and so many spans that some are looked for in several steps.
+/// Enough joints that a lane has several, and enough spans that the search for some takes several steps.
 const LARGE: Size = Size {
     joints: 44,
     spans: 40,

@@ -124,8 +124,8 @@ mod tests {
         Some(QueueIndex { family, index })
     }
 
-    /// Copy engines first, then what computes without drawing, then a second queue of the same
-    /// family; nothing where there is one queue.
+    /// The queue for copies is that of a copy engine, else that of a family that computes without graphics, else a
+    /// second queue of the same family; with a single queue there is none.
     #[test]
     fn each_card_copies_on_the_queue_that_is_least_in_the_way() {
         assert_eq!(of("H200"), queue(1, 0));
@@ -140,7 +140,7 @@ mod tests {
         assert_eq!(of("SwiftShader"), None);
     }
 
-    /// Kernels leave the queues that draw alone, where a family computes alone.
+    /// Kernels run in a family without graphics, if a card has one.
     #[test]
     fn each_card_computes_where_it_does_not_draw() {
         for (name, family) in [

@@ -142,7 +142,7 @@ pub(crate) struct GroupItems {
     pub(crate) first_item: u32,
     /// The number of items, or of samples of a sample list.
     pub(crate) items: u32,
-    /// The offset of the first sample of a sample list, or what is added to the offsets of spread runs.
+    /// The offset of the first sample of a sample list, or the number that is added to the offsets of spread runs.
     pub(crate) first_output: u32,
     pub(crate) shape: WorkShape,
 }
@@ -211,8 +211,8 @@ pub(crate) struct ListRequest<'a> {
 pub(crate) trait ListRoom<'r> {
     type Error: From<SampleTimesError>;
 
-    /// Room for lists of so many bytes: items or listed samples, distances, and blocks; none for those that kernels do
-    /// not bind. It may be slow to read.
+    /// Memory for lists with these numbers of bytes: items or listed samples, distances, and blocks; none for lists
+    /// that kernels do not bind. Reading from this memory may be slow.
     fn room(self, bytes: [Option<usize>; 3]) -> Result<[&'r mut [u8]; 3], Self::Error>;
 }
 

@@ -74,7 +74,7 @@ impl TrackStride {
         stride
     }
 
-    /// Whether a part has the spans of the first one, so many tracks further on.
+    /// Whether a part has the spans of the first part, with indices for `tracks` tracks further on.
     fn fits(self, prepared: &Prepared, first: &TrackPart, part: &TrackPart, tracks: u32) -> bool {
         let spans = &prepared.spans;
         let constants = self.constants.wrapping_mul(tracks);
@@ -218,7 +218,7 @@ impl SharedGroup {
         }
     }
 
-    /// Its lists: of some tracks, repeated, and of what is left of its tracks. `None` as in
+    /// The lists of a group: one of some tracks, which is repeated, and one of the remaining tracks. `None` as in
     /// [`SharedGroup::tracks_of_list`].
     fn lists_of_tracks(&self, lanes: SpreadLanes) -> Option<Vec<SharedList>> {
         let tracks = self.tracks_of_list(lanes)?;

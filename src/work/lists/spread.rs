@@ -88,7 +88,8 @@ pub(crate) enum LaneAxis {
     Tracks { stride: u32 },
 }
 
-/// How often the entries of a list are evaluated, and how much further on each time.
+/// How often the entries of a list are evaluated, and by how much the indices of segments, constants and results grow
+/// each time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct RunRepetitions {
     pub(crate) count: u32,
@@ -149,8 +150,8 @@ impl SpreadLanes {
         Self::new(run_lanes.of_class(class).ilog2())
     }
 
-    /// Lanes with neighbouring tracks, of which there are so many with so many samples each: the most of which at most an
-    /// eighth has no track, from a line of rotations up to a workgroup.
+    /// The lanes for runs of neighbouring tracks: at least as many as a cache line has rotations, at most a workgroup.
+    /// Of these sizes, it is the largest at which at most an eighth of the lanes has no track.
     pub(crate) fn of_tracks(tracks: u32, samples: u32, stride: u32) -> Self {
         let is_used = |log2: &u32| {
             let lanes = tracks.next_multiple_of(1 << log2);

@@ -267,7 +267,7 @@ impl RecordedPlan {
         folder.join(Self::name())
     }
 
-    /// Reads the record of a directory; `None` where it has no shards.
+    /// Reads the record of a directory; `None` if it has no shards.
     pub(crate) fn read(folder: &Path) -> Result<Option<Self>, Failure> {
         let path = Self::path(folder);
         let refuse = |why: &dyn std::fmt::Display| {

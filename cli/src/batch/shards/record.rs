@@ -131,7 +131,7 @@ pub(crate) fn text<'a>(
     first + &lines.concat()
 }
 
-/// The header of a shard's file, and its length; `None` where the file is not a shard's.
+/// The header of a shard's file, and its length; `None` if the file is not a shard's.
 pub(crate) fn header(bytes: &[u8]) -> Option<(ShardHeader, usize)> {
     let end = bytes.iter().position(|&byte| byte == b'\n')? + 1;
     let header = serde_json::from_slice(&bytes[..end]).ok()?;
@@ -179,7 +179,7 @@ struct NamedResult {
     one_of: Option<(String, usize)>,
 }
 
-/// The result that a line names, and that of all clips; `None` where the line is not an entry, or names
+/// The result that a line names, and that of all clips; `None` if the line is not an entry, or names
 /// a result outside its directory.
 pub(crate) fn owner(line: &[u8]) -> Option<(String, Option<String>)> {
     let NamedResult { output, one_of } = serde_json::from_slice(line).ok()?;
@@ -267,7 +267,7 @@ fn for_each_line(folder: &Path, mut each: impl FnMut(&[u8])) {
     }
 }
 
-/// The inputs without results in a directory's manifest, by the names of their results; `None` where there is no
+/// The inputs without results in a directory's manifest, by the names of their results; `None` if there is no
 /// manifest.
 pub(crate) fn merged_failures(folder: &Path) -> Option<HashMap<String, InputEntry>> {
     let file = entry::open(folder).ok().flatten()?;

@@ -23,7 +23,7 @@ pub(crate) struct DeviceReport {
     driver_version: Option<u32>,
     uuid: String,
     choices: Option<EngineChoices>,
-    /// Bytes a second into the device's own memory; `None` where it has no clock.
+    /// Bytes a second into the device's own memory; `None` if it has no clock.
     write_rates: Option<WriteRates>,
 }
 
@@ -57,7 +57,7 @@ impl BenchDevice {
         info.is_some_and(|info| !matches!(info.kind, DeviceKind::Integrated | DeviceKind::Cpu))
     }
 
-    /// Bytes a second that nothing exceeds for long; 0 where that is unknown.
+    /// Bytes a second that nothing exceeds for long; 0 if that is unknown.
     pub(crate) fn write_limit(&self) -> f64 {
         self.report.write_rates.map_or(0.0, |rates| rates.limit())
     }

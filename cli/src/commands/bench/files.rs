@@ -45,7 +45,7 @@ pub(crate) fn measure(shrink: usize, repetitions: Repetitions) -> Result<Vec<Sec
     sections.filter_map(Result::transpose).collect()
 }
 
-/// Writes the clips: each begins a frame later in the walk than the one before. Nothing where the
+/// Writes the clips: each begins a frame later in the walk than the one before. Nothing if the
 /// format holds one joint.
 fn library(
     format: &Format,

@@ -228,7 +228,7 @@ fn measure(
     Ok(Section::new(kind, method, count, rows))
 }
 
-/// Keys and results stay on the device, whose clock counts; `None` where it has none.
+/// Keys and results stay on the device, whose clock counts; `None` if it has none.
 fn resident<'a>(
     device: &BenchDevice,
     clip: &'a Clip,

@@ -97,7 +97,7 @@ pub(crate) struct Host {
 pub(crate) struct DeviceSection {
     #[serde(flatten)]
     pub(crate) info: DeviceInfo,
-    /// Nothing where it could not be opened.
+    /// Nothing if it could not be opened.
     pub(crate) details: Option<DeviceDetails>,
     pub(crate) choices: Option<EngineChoices>,
     pub(crate) bus: Option<Bus>,

@@ -98,7 +98,7 @@ fn curve() -> impl TypedValueParser<Value = ReducedCurve> {
 /// The report of one clip.
 #[derive(Debug, Clone, Serialize)]
 struct ReductionReport {
-    /// The input, and its animation where it has several.
+    /// The input, and its animation if it has several.
     input: String,
     keys_before: usize,
     keys_after: usize,

@@ -13,7 +13,7 @@ pub(crate) const SUN: Vec3 = Vec3::new(0.371_390_68, 0.742_781_35, 0.557_086);
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Face {
     pub(crate) corners: [Vec3; 3],
-    /// The normal for lighting; `None` where the colour is used unchanged.
+    /// The normal for lighting; `None` if the colour is used unchanged.
     pub(crate) normal: Option<Vec3>,
     pub(crate) colour: Colour,
     /// Whether it is seen from behind too.

@@ -95,7 +95,7 @@ fn figure(subject: &SmoothingSubject<'_>) -> Figure {
     }
 }
 
-/// The track whose samples smoothing has changed most; `None` where nothing changed.
+/// The track whose samples smoothing has changed most; `None` if nothing changed.
 fn noisiest<T>(
     before: &[T],
     after: &[T],

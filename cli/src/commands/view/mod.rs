@@ -235,7 +235,7 @@ impl Arguments {
         Ok(())
     }
 
-    /// Refuses `--no-ghosts` where there are none.
+    /// Refuses `--no-ghosts` if there are none.
     fn check_ghosts(&self, found: &FoundGhosts, inputs: usize) -> Result<(), Failure> {
         let on = match inputs {
             _ if !found.is_empty() => return Ok(()),

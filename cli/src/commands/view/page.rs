@@ -180,7 +180,7 @@ pub(crate) struct StoredSet {
     keys: String,
     /// The first of them is shown first.
     results: Vec<StoredResult>,
-    /// The clip that the page's engine evaluates; `None` where the page only shows the stored results.
+    /// The clip that the page's engine evaluates; `None` if the page only shows the stored results.
     clip: Option<StoredClip>,
     /// Whether joints have scales: meshes that follow them are then drawn by the engine's matrices alone.
     has_scales: bool,

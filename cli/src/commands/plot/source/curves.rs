@@ -330,7 +330,7 @@ impl PlotSource<'_> {
         Ok(panel)
     }
 
-    /// Angle to the reference, radians, as powers of ten; where there is none, a gap.
+    /// Angle to the reference, radians, as powers of ten; if there is none, a gap.
     fn error(&self, device: &mut OpenedDevice, index: usize) -> Result<Panel, Failure> {
         let mut curves = Vec::new();
         let mut level = f64::NEG_INFINITY;
@@ -431,7 +431,7 @@ fn has_name(set: &TrackSet, index: usize) -> bool {
     set.track(index).name.is_some_and(|name| !name.is_empty())
 }
 
-/// The name of a scalar; `scalar 1` where it has none.
+/// The name of a scalar; `scalar 1` if it has none.
 pub(crate) fn scalar_name(clip: &Motion, index: usize) -> String {
     match clip.set.scalar(index).map_or("", |keys| keys.name) {
         "" => format!("scalar {}", index + 1),
