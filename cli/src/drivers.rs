@@ -36,9 +36,9 @@ fn patience() -> u64 {
         .unwrap_or(PATIENCE)
 }
 
-/// Ends the process when a driver ends it by `exit`: what then runs at the ordinary end waits for the loader's lock,
-/// which the driver's caller holds, and the parent would wait for all of its time limit. Destructors of thread-local
-/// values run before.
+/// Ends the process at once when a driver calls `exit`. Otherwise, functions that run at the end of a process would
+/// wait for the loader's lock, which the driver's caller holds, and the parent would wait until its time limit.
+/// Destructors of thread-local values, such as this one, run before these functions.
 struct EndAtOnce {
     is_loading: Cell<bool>,
 }

@@ -46,9 +46,9 @@ pub(crate) fn time_text(whole: i64, time: f64) -> String {
     }
 }
 
-/// Number of decimals in seconds of a number in a unit of `10^power` seconds. Digits after those that an f64 has do
-/// not count where they are those of an f64: `numpy.savetxt` prints 18 decimals of any number, and 1700000000.05
-/// becomes 1700000000.049999952….
+/// Number of decimals in seconds of a number in a unit of `10^power` seconds. If the digits are those of an f64 printed
+/// with more digits than it has, only the digits that it has count: `numpy.savetxt` prints 18 decimals of any number,
+/// and 1700000000.05 becomes 1700000000.049999952….
 pub(crate) fn decimal_count(token: &str, power: i32) -> u32 {
     let last = last_digit_power(token);
     let exact = f64_power(token, last).unwrap_or(last);

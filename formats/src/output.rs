@@ -267,8 +267,8 @@ pub fn remove_marked(directory: &Path, mark: &str) {
     });
 }
 
-/// As [`remove_abandoned`], of the temporary files that were created with `mark` alone: those of a worker of this machine
-/// that was killed, not those of one that still runs.
+/// As [`remove_abandoned`], but only for temporary files that were created with `mark`. Files of a worker that still
+/// runs on this machine are kept; those of a worker that was killed are removed.
 pub fn remove_abandoned_marked(directory: &Path, mark: &str) {
     remove_temporary(directory, |folder, name, of_file| {
         let is_marked = of_file.starts_with(mark);

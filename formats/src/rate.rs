@@ -230,11 +230,12 @@ pub(crate) fn overridden(rate: FrameRate, other: FrameRate) -> String {
     )
 }
 
-/// The rate of a frame time with these digits: an integer number of frames whose time is written so, or such a number
-/// times 1000/1001, or the number itself. Digits may have been rounded, as in 0.017, or cut off, as in 0.0166. If several
-/// rates are possible, the common one is chosen if there is only one. A rate that would change the duration by more than
-/// [`MAX_CHANGE`], or for digits that were cut off by more than [`UNNOTICED`], is not meant. Some programs print the
-/// digits of an f32, so that the time may also have been rounded to f32. `None` for times outside 1e-9 s to 1e9 s.
+/// The rate of a frame time with these digits. Candidates are the whole rates whose frame time is written with these
+/// digits, such rates times 1000/1001, and last the number itself. Digits may have been rounded, as in 0.017, or cut
+/// off, as in 0.0166. If several rates are possible and exactly one of them is a usual rate, that one is chosen. A rate
+/// is not considered if it would change the duration by more than [`MAX_CHANGE`], or, for digits that were cut off, by
+/// more than [`UNNOTICED`]. Some programs print the digits of an f32, so that the time may also have been rounded to
+/// f32. `None` for times outside 1e-9 s to 1e9 s.
 fn of_period(digits: &str) -> Option<FrameRate> {
     let period: f64 = digits.parse().ok()?;
     if !(1e-9..=1e9).contains(&period) {

@@ -63,7 +63,7 @@ impl Inputs {
         self.gather_with(times_from_stdin, Repeats::Once)
     }
 
-    /// The paths of the inputs, for commands that compare an input with itself where it is named twice.
+    /// The paths of the inputs, with repetitions: if an input is named twice, the command compares it with itself.
     pub(crate) fn with_repeats(&self) -> Result<Vec<PathBuf>, Failure> {
         Ok(self.gather_with(false, Repeats::Keep)?.paths())
     }
@@ -162,12 +162,12 @@ impl Inputs {
         &self.paths
     }
 
-    /// As [`Inputs::gather`], the paths alone.
+    /// As [`Inputs::gather`], but only the paths.
     pub(crate) fn distinct(&self, times_from_stdin: bool) -> Result<Vec<PathBuf>, Failure> {
         Ok(self.gather(times_from_stdin)?.paths())
     }
 
-    /// Reads a keyframe file, and warns of what is in it.
+    /// Reads a keyframe file, and prints its warnings.
     pub(crate) fn load(&self, path: &Path) -> Result<Loaded, Failure> {
         let loaded = self.load_quietly(path)?;
         loaded.warnings.iter().cloned().for_each(words::warn_of);
@@ -410,7 +410,7 @@ pub(crate) enum Repeats {
     /// They are processed once, with a warning.
     #[default]
     Once,
-    /// They are inputs as often as they are named.
+    /// A file is an input as often as it is named.
     Keep,
 }
 
@@ -620,8 +620,8 @@ impl GatheredInputs {
         Ok(gathered)
     }
 
-    /// Keeps the path without symbolic links of a file that was found several times, in whatever order, and warns about
-    /// the others.
+    /// For each file that was found several times, in any order, keeps the path without symbolic links, and warns about
+    /// the other paths.
     fn settle(&mut self, repeated: Vec<(usize, FoundInput)>) {
         const LISTED: usize = 3;
         let count = repeated.len();
@@ -652,8 +652,8 @@ impl GatheredInputs {
         self.files.iter().map(|found| found.path.clone()).collect()
     }
 
-    /// The inputs that a path stands for. Files that are named or that match a pattern are left out by their paths as
-    /// they are given, those in directories by their paths below the directory.
+    /// The inputs that a path stands for. Exclusions are compared with the path as written for files that are named or
+    /// match a pattern, and with the path below the directory for files in directories.
     fn expand(
         &mut self,
         path: &Path,
@@ -772,7 +772,7 @@ impl GatheredInputs {
     }
 }
 
-/// The inputs below a directory that `--exclude` leaves out, where it leaves out all.
+/// The number of inputs below a directory, for the message that `--exclude` leaves out all of them.
 fn count_inputs(directory: &Path, selection: &InputSelection<'_>) -> usize {
     if selection.exclude.is_empty() {
         return 0;

@@ -240,8 +240,8 @@ fn key_signs() -> impl TypedValueParser<Value = KeySigns> {
     one_of(KeySigns::ALL.map(|signs| (signs.name(), help(signs), signs)))
 }
 
-/// Where the curves of a set are less smooth than their method promises: the first such key is named, others
-/// are counted.
+/// A warning if curves of a set are less smooth at some keys than their method promises. It names the first such key
+/// and counts the others.
 pub(crate) fn curve_warning(
     name: &str,
     clip: &Motion,
@@ -318,7 +318,7 @@ impl CurveChoice {
         }
     }
 
-    /// The same curve, of which another quantity is evaluated.
+    /// The same curve, with another quantity.
     pub(crate) fn of(self, quantity: Quantity) -> Self {
         Self { quantity, ..self }
     }

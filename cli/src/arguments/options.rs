@@ -32,8 +32,8 @@ pub(crate) struct OptionRule {
 /// The part of an option on which the bytes of a result depend.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Bytes {
-    /// Nothing: it says where inputs and results are, what is permitted, which device computes, or what is
-    /// reported. Times may come from standard input, so the commands that read them add their hash.
+    /// No part: the option names the places of inputs and results, permits something, selects the device, or controls
+    /// reports. Times may come from standard input, so the commands that read them add their hash.
     Unchanged,
     /// Its value.
     ByValue,
@@ -43,7 +43,8 @@ pub(crate) enum Bytes {
 
 /// The inputs or results to which an option applies.
 pub(crate) enum AppliesTo {
-    /// Everything that its command does; combinations that depend on values are refused where these are used.
+    /// All inputs and results of its command. Combinations that depend on values are refused by the code that uses the
+    /// values.
     All,
     /// Inputs of formats that take it.
     Inputs(FormatOption),
@@ -530,8 +531,8 @@ impl CommandLine {
         self.explicit.contains(option)
     }
 
-    /// Refuses the first of these options, `(id, name)`, that the command line names: it has no effect. `on` says
-    /// on what, and `remedy` what to do.
+    /// Refuses the first of these options, `(id, name)`, that the command line names, because it would have no effect
+    /// on `on`. `remedy` says what to do.
     pub(crate) fn refuse(
         &self,
         options: &[(&str, &str)],
@@ -640,8 +641,8 @@ pub(crate) struct OptionFile {
     pub(crate) sha256: String,
 }
 
-/// The hash of a file; empty if it cannot be read again, as standard input. That of the models in a folder of
-/// body models.
+/// The hash of a file; empty if it cannot be read again, as standard input. For a folder of body models, the hash of
+/// the models in it.
 pub(crate) fn content(file: &str) -> String {
     if Path::new(file).is_dir() {
         return digest::of_folder(Path::new(file), "npz");

@@ -238,7 +238,8 @@ impl DialectArguments {
         }
     }
 
-    /// The robot whose bodies a dialect has: that of the file, or without its fixed bodies.
+    /// The robot with the bodies that a dialect stores: the robot of the file, or the one whose fixed bodies are merged
+    /// into others.
     pub(crate) fn robot_of<'a>(
         &self,
         dialect: &WrittenDialect,
@@ -335,7 +336,8 @@ impl DialectArguments {
         (!joints.is_empty()).then(text)
     }
 
-    /// Applies the rule for limits to the scalars of a clip at samples, `[sample][scalar]`; `rates` are how fast they change.
+    /// Applies the rule for limits to the scalars of a clip at samples, `[sample][scalar]`; `rates` are their
+    /// velocities.
     pub(crate) fn limit_scalars(
         &self,
         work: &ClipWork,
@@ -441,8 +443,8 @@ impl DialectArguments {
     }
 }
 
-/// The name of a clip that has none: that of the result's file up to the first point, by which loaders look clips up, or
-/// of the input's if the result is on standard output.
+/// The name for a clip without a name: the name of the result's file up to the first point, because loaders find clips
+/// by this name; if the result is written to standard output, the name of the input's file.
 fn name_of_file(work: &ClipWork) -> String {
     let file = match names::is_standard(work.target.path()) {
         true => work.path(),

@@ -359,8 +359,8 @@ impl SamplingArguments {
 }
 
 impl SampleChoice {
-    /// The same, with frames halfway between keys where `--fps` is that of the input: a curve is compared where it is
-    /// no key.
+    /// The same, but with frames halfway between keys if `--fps` is the rate of the input, because the curve must be
+    /// compared between keys, too.
     pub(crate) fn and_halves(mut self) -> Self {
         if let Self::Rate { rate, .. } = &mut self
             && *rate == RateChoice::Source
@@ -408,7 +408,7 @@ impl SampleChoice {
     /// The samples for one clip; warns when they exceed its keys, and of those in gaps.
     ///
     /// # Errors
-    /// When one is in a gap, and such are refused.
+    /// When a sample is in a gap, and samples in gaps are refused.
     pub(crate) fn of_clip(
         &self,
         clip: &Motion,
@@ -491,8 +491,8 @@ impl SampleChoice {
     /// The samples for one clip; warns when they exceed its keys.
     ///
     /// # Errors
-    /// When the clip has none of the times: of those of another file, or where times outside its keys are left
-    /// out.
+    /// When no time is left: if the times of another file are all outside the clip, or if times outside its keys are
+    /// left out.
     pub(crate) fn of(
         &self,
         clip: &Motion,

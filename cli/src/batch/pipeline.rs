@@ -121,8 +121,8 @@ impl ClipWork {
         }
     }
 
-    /// The name of the clips in results: with the name of the input's file alone, so that a file has the same results
-    /// wherever it is.
+    /// The name of the clips in results. It contains only the name of the input's file, not its directory, so that a
+    /// file has the same results in every directory.
     pub(crate) fn origin(&self) -> String {
         let input = names::input(self.path());
         let animation = self.name.strip_prefix(&*input).unwrap_or_default();
@@ -168,7 +168,7 @@ pub(crate) struct Pipeline<'a> {
     /// Nothing for a single result.
     batch: Option<BatchRecords<'a>>,
     outcomes: Outcomes,
-    /// The records of results and failures, where they are printed as JSON.
+    /// The records of results and failures, if they are printed as JSON.
     json: Option<Vec<Value>>,
 }
 
@@ -212,7 +212,7 @@ struct BatchRecords<'a> {
     records: Box<dyn ResultRecorder + 'a>,
     summary: BatchSummary,
     progress: Progress,
-    /// A signal ends the batch at its next input; the batch then says how much is done.
+    /// A signal ends the batch at its next input; the batch then prints how much is done.
     _until_end: BatchGuard,
     options: ResultOptions,
     previous: PreviousEntries,
@@ -858,7 +858,7 @@ struct ReadingAhead<R> {
 }
 
 impl<R: InputReader> ReadingAhead<R> {
-    /// Reads the inputs one by one; stops when the receiver is gone.
+    /// Reads the inputs one by one; stops when the receiver was dropped.
     fn read_all(&self, jobs: Vec<PipelineJob>, hand_over: &SyncSender<ReadJob>) {
         for job in jobs {
             let input = self.read(&job);
@@ -900,7 +900,7 @@ pub(super) struct ClipFile {
     pub(super) target: ResultTarget,
 }
 
-/// The files of an input whose result is `target`; a clip that can have none fails alone.
+/// The files of an input whose result is `target`. If a clip can have no file, only this clip fails.
 pub(super) fn clip_files(
     path: &Path,
     loaded: &Loaded,

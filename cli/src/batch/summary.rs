@@ -1,5 +1,5 @@
-//! Messages of a batch about its inputs: the lines of results and failures, as long as they are few, and a line for
-//! each code of a warning at the end, or every warning of a single input. Everything that is not printed is in the
+//! Messages of a batch about its inputs: lines for results and failures, if there are only a few, and at the end a line
+//! for each code of a warning. For a single input, every warning is printed. Everything that is not printed is in the
 //! manifest.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -71,7 +71,8 @@ impl BatchSummary {
         }
     }
 
-    /// The line about a result, if it is to be printed. `assumed_fps` is the rate of a result whose input has none.
+    /// The line about a result, if it must be printed. `assumed_fps` is the rate that was assumed for an input without
+    /// a rate.
     pub(crate) fn result<'a>(
         &mut self,
         line: &'a str,

@@ -300,8 +300,8 @@ impl Remedies {
         }
     }
 
-    /// `tumble features … --resume makes them again`; `None` if that would not help. The verb is that of one command,
-    /// and of several.
+    /// `tumble features … --resume makes them again`; `None` if that would not help. `verbs` are the verb for one
+    /// command, and the verb for several.
     fn resume(&self, more: &str, verbs: [&str; 2], again: &str) -> Option<String> {
         let helps = self.is_known && !self.has_damaged_lines;
         let lines = self.lines(&format!("--resume{more}"));
@@ -366,7 +366,7 @@ fn fault(folder: &Path, entry: &ManifestEntry, inputs: &InputHashes<'_>) -> Opti
     }
 }
 
-/// The hashes of inputs as they are now, by their paths in the manifest. Those that are not found have none.
+/// The present hashes of inputs, by their paths in the manifest. Inputs that are not found have none.
 #[derive(Default)]
 struct InputHashes<'a> {
     inputs: BTreeMap<&'a str, Option<String>>,

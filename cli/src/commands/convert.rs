@@ -309,7 +309,7 @@ impl Arguments {
     }
 }
 
-/// Says that the weights of morph targets stay as they are, if some are those of one side.
+/// Prints that the weights of morph targets are not mirrored, if some belong to one side.
 fn note_weights(name: &str, clips: &[&Motion]) {
     for clip in clips {
         let weights = (0..clip.set.scalar_count()).filter_map(|index| clip.set.scalar(index));
@@ -331,8 +331,8 @@ fn note_weights(name: &str, clips: &[&Motion]) {
     }
 }
 
-/// `; 6 pairs of joints change their sides and no joint is mirrored in place`: of each animation by its name, where they
-/// differ.
+/// `; 6 pairs of joints change their sides and no joint is mirrored in place`. If this differs between animations,
+/// there is a text for each, with its name.
 fn mirrored_text(parts: &[Cow<'_, Motion>], changed: &[Option<String>]) -> String {
     let differ = changed.windows(2).any(|pair| pair[0] != pair[1]);
     let texts = changed.iter().flatten().zip(parts);

@@ -29,7 +29,7 @@ pub(crate) struct Failure {
     message: String,
     /// Lines below it.
     more: Vec<String>,
-    /// The message is printed as it is, without `error:` before it.
+    /// The message is printed unchanged, without `error:` before it.
     plain: bool,
     /// An output that cannot be written, where another one may be.
     is_of_one: bool,
@@ -160,7 +160,7 @@ impl Failure {
         }
     }
 
-    /// A result of an input does not fit on the disk. Another input's may. `limit` says how much is free.
+    /// A result of an input does not fit on the disk; results of other inputs may fit. `limit` says how much is free.
     pub(crate) fn room(input: &str, result: &str, bytes: f64, limit: &str) -> Self {
         let amount = words::bytes(bytes);
         let message = format!(
@@ -224,7 +224,7 @@ impl Failure {
     }
 }
 
-/// Whether the error concerns this file alone: its name, its folder or its length.
+/// Whether the error concerns only this file: its name, its folder or its length.
 fn is_of_one(error: &io::Error) -> bool {
     use io::ErrorKind::{
         AlreadyExists, DirectoryNotEmpty, FileTooLarge, InvalidFilename, InvalidInput,
@@ -321,7 +321,7 @@ pub(crate) struct FailedInputs {
 }
 
 impl FailedInputs {
-    /// Counts inputs by the exit codes of commands that have each of them alone.
+    /// Counts inputs by the exit code of a command that has only this input.
     pub(crate) fn of_codes(codes: impl Iterator<Item = Option<u8>>) -> Self {
         codes.fold(Self::default(), |mut count, code| {
             match code {

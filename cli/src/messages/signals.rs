@@ -1,11 +1,12 @@
 //! Ctrl-C, SIGTERM, SIGHUP and SIGQUIT, on Windows Ctrl-C, Ctrl-Break and a closed window: stop soon, and
 //! leave no half-written file.
 //!
-//! A thread waits for the signal, and says that it came. While no output file is open and no batch runs, it ends the
-//! program at once. Otherwise it leaves a mark: the writer of a file finds it at its next chunk, and removes its
-//! temporary file on the way out; a batch finds it before its next input, and says how far it is. A batch that does not
-//! find it for [`GRACE`] is ended without that, unless a file is open. A second signal removes the file itself, and
-//! ends the program at once. Signals that this process was started to ignore, as by `nohup`, are ignored.
+//! A thread waits for the signal, and prints a line about it. While no output file is open and no batch runs, it ends
+//! the program at once. Otherwise it sets a mark. The writer of a file checks the mark before its next chunk, and
+//! removes its temporary file; a batch checks it before its next input, and prints how far it has come. If a batch does
+//! not check the mark within [`GRACE`], it is ended without this line, unless a file is open. A second signal removes
+//! the file itself, and ends the program at once. Signals that this process was started to ignore, as by `nohup`, are
+//! ignored.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;

@@ -203,8 +203,8 @@ impl FrameKeys {
     }
 }
 
-/// Programs that know the rotations of joints and not their positions, as of a body whose shape is not known, write
-/// such files.
+/// Such files are written by programs that know the rotations of joints but not their positions, for example of a body
+/// whose shape is unknown.
 const NO_OFFSETS: &str = "all offsets in the file are 0, so the positions of joints relative to their parents are \
                           unknown; give them with --offsets";
 

@@ -31,7 +31,7 @@ pub(super) const JOINT: &str = "_dof";
 /// The fewest columns of Unitree's files: position, quaternion, two joints.
 const FEWEST: usize = 9;
 
-/// After so many lines of a dialect, another line is a damaged one of it.
+/// After this many lines of a dialect, a line of another form counts as damaged, not as another dialect.
 const CERTAIN: usize = 2;
 
 /// How far from 1 the norm of a quaternion may be.

@@ -119,8 +119,7 @@ pub(super) fn without_spheric_orders(
 }
 
 impl StackLayers {
-    /// # Errors
-    /// When the library has no memory, or when the budget has none.
+    /// # Errors When the library cannot allocate memory, or when the budget is exhausted.
     pub(super) fn of(
         scene: &Scene,
         stack: &AnimStack,

@@ -348,7 +348,7 @@ struct FbxReader<'a> {
     nodes: FbxNodes,
     /// The rate that the file states.
     rate: Option<FrameRate>,
-    /// The animation without layers, in which nodes rest; `None` if `ufbx` knows where they rest.
+    /// The animation without layers, in which nodes are in their rest poses; `None` if `ufbx` provides the rest poses.
     rests: Option<AnimRoot>,
     options: &'a ReadOptions,
     /// How many evaluations are left.

@@ -56,9 +56,9 @@ struct References<'a> {
 /// A text, and the bytes that are left out of its BIN chunk.
 type PrunedText = (String, Cut);
 
-/// The text of a file with other keys, without what `before`, the file as it was, used for its animations and the new
-/// text does not use, and what to leave out of its BIN chunk of `length` bytes. A file with parts that are not as in
-/// glTF, so that it is not known what they refer to, stays as it is.
+/// Removes the objects that the animations of `before`, the original file, used and that `text`, the file with other
+/// keys, does not use. Returns the new text, and the bytes to leave out of the BIN chunk of `length` bytes. If the file
+/// has parts that glTF does not define, their references are unknown, so nothing is removed.
 pub(super) fn prune(before: &Json<'_>, text: String, length: usize) -> PrunedText {
     let pruned = without_unused(before, &text, length, |json| unused_samplers(before, json));
     pruned.ok().flatten().unwrap_or((text, Cut::default()))

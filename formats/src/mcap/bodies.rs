@@ -179,7 +179,8 @@ impl StampClock {
     }
 }
 
-/// Gives a static transform times: that of its first value is `start`, and those of other values are when they came.
+/// Sets the times of a static transform: the time of its first value is `start`, and the times of its other values are
+/// their stamps, or else the times at which they were logged.
 fn resolve_static(body: &mut Body<'_>, start: Option<i64>, clock: &StampClock) {
     let mut kept: Vec<TimedPose> = Vec::new();
     let mut last_stamp = i64::MIN;

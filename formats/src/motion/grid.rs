@@ -43,7 +43,8 @@ pub(crate) fn restore(lists: &mut [Vec<f64>], precision: Precision) -> Option<Fr
     rate.or_else(|| of_sums(lists).filter(|_| precision == Precision::F32))
 }
 
-/// The fewest keys on successive frames that show that the key at the end alone is between two frames.
+/// At least this many keys on successive frames are needed to conclude that only the key at the end is between two
+/// frames.
 const FRAMES_IN_A_ROW: usize = 8;
 
 /// The frames of clips that end between two of them: a clip of 1.158 s that was evaluated at 60 frames a second has a

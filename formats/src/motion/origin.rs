@@ -139,8 +139,8 @@ mod tests {
         assert_eq!(coordinate(2500.5, 0.25), "2500.75");
     }
 
-    /// Positions of maps come back within 1e-9 of themselves, or what f32 and its
-    /// shortest digits round half of their extent by.
+    /// Positions of maps are read back within 1e-9 relative, or within the rounding of half of their extent to f32 and
+    /// its shortest digits.
     #[test]
     fn nothing_of_a_map_is_lost() {
         let mut state = 1u64;

@@ -322,7 +322,7 @@ impl ArchivePlan {
         Ok(())
     }
 
-    /// Takes quaternions of a robot's motion for such in another order.
+    /// Changes the order in which the components of a robot's quaternions are read.
     ///
     /// # Errors
     /// When the file is in no dialect, or has no quaternions.

@@ -1,5 +1,5 @@
-//! Checks the schema of a file before it is decoded: the crate recurses into its groups, and reserves memory for as many
-//! columns as a group is said to have.
+//! Checks the schema of a file before it is decoded: the crate `parquet` recurses into its groups, and reserves memory
+//! for the number of columns that a group states.
 
 use crate::parquet::thrift::{Compact, INTEGER, LIST, STRUCT};
 

@@ -237,8 +237,9 @@ pub fn missing_text(missing: &[&str]) -> String {
     }
 }
 
-/// The axis along which a body stands: that of the direction from the feet to the head, on average over the positions of
-/// all joints in some poses. `None` if no axis is clear, as if it crawls on all fours along a diagonal, or lies.
+/// The axis along which a body stands: that of the direction from the feet to the head, on average over the positions
+/// of all joints in some poses. `None` if no axis is clear, for example if the body crawls on all fours along a
+/// diagonal, or lies.
 #[must_use]
 pub fn standing_axis<P: AsRef<[DVec3]>>(
     roles: &Roles,

@@ -334,8 +334,9 @@ fn valued_scalars<'a>(
     valued
 }
 
-/// The whole turns nearest to the middle of some angles, if without them the largest angle is less than half as large, or
-/// smaller and otherwise in coarse steps: angles near 0 keep the digits of the file.
+/// The whole turns nearest to the middle of some angles, to be subtracted from them. `None` unless the largest
+/// magnitude then becomes less than half, or becomes smaller and was so large that f32 has coarse steps there. So
+/// angles near 0 keep the digits of the file.
 fn whole_circles(angles: &[f64]) -> Option<f64> {
     let [low, high] = [f64::min, f64::max].map(|pick| angles.iter().copied().reduce(pick));
     let (low, high) = (low?, high?);
@@ -651,8 +652,8 @@ fn joints_by_name(
     })
 }
 
-/// The tree of a file that has as many bodies as the robot without those that have no joints, as programs have them that
-/// merge these into others; and the robot's body of each of its own.
+/// The tree without the bodies that have no joints, and for each of its bodies the index of the robot's body. Some
+/// programs merge such bodies into others. `None` unless the file has exactly as many bodies as this tree.
 fn merged_bodies(robot: &Robot, recorded: Option<&RecordedBodies>) -> Option<(Tree, Vec<usize>)> {
     let kept = kept_bodies(&robot.tree);
     let is_merged = recorded?.count == kept.len() && kept.len() < robot.tree.bodies().len();

@@ -165,7 +165,7 @@ pub enum BodiesError {
         excess.joint, excess.excess, excess.unit, excess.sample
     )]
     OutsideLimits {
-        /// The joint and by how much.
+        /// The joint, and by how much its value is outside.
         excess: LimitExcess,
     },
 }
@@ -433,7 +433,7 @@ pub fn scalar_excesses(clip: &Motion, values: &[f32]) -> Vec<LimitExcess> {
     excesses
 }
 
-/// Keeps the scalars of a clip inside their limits; where they are outside, what changes (`rates`) is 0.
+/// Keeps the scalars of a clip inside their limits. If a scalar was outside, its velocity in `rates` becomes 0.
 pub fn clamp_scalars(clip: &Motion, values: &mut [f32], mut rates: Option<&mut [f32]>) {
     let count = clip.set.scalar_count().max(1);
     for (at, value) in values.iter_mut().enumerate() {

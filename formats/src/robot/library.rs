@@ -15,8 +15,8 @@ pub const LARGEST_ANGLE: f64 = 4096.0;
 #[derive(Debug, Clone)]
 pub struct RobotTracks<'a> {
     tree: &'a Tree,
-    /// Tracks of rotations, each with the names that it may have and the pose at which it rests. The first is that of the
-    /// base, if a clip moves it.
+    /// Tracks of rotations, each with its name and its rest pose. The first track is the base, if a clip moves the
+    /// base.
     moving: Vec<(String, BodyPose)>,
     has_base: bool,
     scalars: ScalarTracks,

@@ -313,7 +313,7 @@ fn scalar_columns(clips: &[SampledClip<'_>]) -> Vec<(String, bool)> {
     all
 }
 
-/// For each column of scalars the scalar of a clip; `None` if the clip has none of this name and kind.
+/// For each column of scalars, the index of the clip's scalar; `None` if the clip has no scalar of this name and kind.
 fn scalars_of(sampled: &SampledClip<'_>, columns: &[(String, bool)]) -> Vec<Option<usize>> {
     let named = sampled.clip.scalar_keys().enumerate();
     let named = named.map(|(index, keys)| sampled.clip.scalar(index).kind.column(keys.name));

@@ -61,7 +61,8 @@ pub(crate) fn cut(text: &[u8]) -> Option<(u64, u64)> {
     Some((above as u64 + 1, column))
 }
 
-/// Where the number at the end of a line begins, and how many digits it has after the point, those of an exponent included.
+/// The start of the number at the end of a line, and its number of digits after the point, including the digits of an
+/// exponent.
 fn last_number(line: &[u8]) -> Option<(usize, usize)> {
     let line = line.strip_suffix(b"\r").unwrap_or(line);
     let is_comment = line.trim_ascii_start().starts_with(b"#");

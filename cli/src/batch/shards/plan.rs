@@ -109,7 +109,7 @@ pub(crate) struct ShardOptions {
 }
 
 impl ShardPlan {
-    /// Cuts inputs, of those sizes, into shards.
+    /// Divides inputs with these sizes into shards.
     pub(crate) fn new(
         inputs: GatheredInputs,
         sizes: &[u64],
@@ -306,8 +306,8 @@ impl RecordedPlan {
         }
     }
 
-    /// The message about a directory whose shards have lost the record of their plan. Where a manifest lists the
-    /// results, files of shards are what an interrupted merge left.
+    /// The message about a directory that has files of shards but no record of their plan. If a manifest lists the
+    /// results, an interrupted merge has left these files.
     pub(crate) fn lost(folder: &Path) -> Option<String> {
         let path = Self::path(folder);
         let is_there = |path: &Path| std::fs::symlink_metadata(path).is_ok();
@@ -349,8 +349,8 @@ impl RecordedPlan {
         output.commit().map_err(|error| Failure::output(&error))
     }
 
-    /// Removes the record and the files of merged shards. The record goes first: without it what an
-    /// interruption leaves is ignored. Files that no shard has written stay.
+    /// Removes the record and the files of merged shards. The record is removed first, because without it the files
+    /// that an interruption leaves are ignored. Files that no shard has written are kept.
     pub(crate) fn remove(opened: &Folder) -> Result<(), Failure> {
         let folder = opened.path();
         let failed = |error: io::Error| {

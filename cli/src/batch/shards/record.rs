@@ -41,10 +41,10 @@ pub(crate) struct ShardHeader {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct RefusedInput {
     pub(crate) input: String,
-    /// The exit code of a command that has this input alone.
+    /// The exit code of a command that has only this input.
     pub(crate) code: u8,
     pub(crate) message: String,
-    /// The result that it would have, where it can have one.
+    /// The result that it would have, if one is possible.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) result: Option<String>,
     /// As in [`InputEntry`].
@@ -212,7 +212,7 @@ pub(crate) fn inputs_of(folder: &Path, results: &HashSet<&str>) -> HashMap<Strin
     inputs
 }
 
-/// The results, of those in `found`, that a directory's manifests have from inputs of other paths, in order.
+/// The results in `found` that, according to a directory's manifests, were made from inputs with other paths; in order.
 pub(crate) fn other_owners(
     folder: &Path,
     found: &HashMap<&str, &FoundInput>,
@@ -235,8 +235,8 @@ pub(crate) fn other_owners(
     owners
 }
 
-/// The first result, of those in `found`, that a directory's manifests have from another command than that of shards,
-/// and this command.
+/// The first result in `found` that, according to a directory's manifests, another command has made than the command of
+/// shards; and that command.
 pub(crate) fn of_other_command(
     folder: &Path,
     found: &HashMap<&str, &FoundInput>,

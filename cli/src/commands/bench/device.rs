@@ -57,7 +57,7 @@ impl BenchDevice {
         info.is_some_and(|info| !matches!(info.kind, DeviceKind::Integrated | DeviceKind::Cpu))
     }
 
-    /// Bytes a second that nothing exceeds for long; 0 if that is unknown.
+    /// The highest sustained speed in bytes per second; 0 if it is unknown.
     pub(crate) fn write_limit(&self) -> f64 {
         self.report.write_rates.map_or(0.0, |rates| rates.limit())
     }

@@ -1,5 +1,4 @@
-//! Motion files: how fast clips are read, beside reading their bytes alone, and whether sampling
-//! them takes much longer than reading them.
+//! Motion files: the time to read clips, compared with the time to read only their bytes, and the time to sample them.
 
 use std::hint::black_box;
 use std::path::{Path, PathBuf};

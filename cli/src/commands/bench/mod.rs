@@ -1,6 +1,6 @@
-//! `tumble bench`: how fast this machine is, against itself and against what a user
-//! would write. Everything is measured in one run, in turns, because machines are
-//! shared and their clocks drift; what counts are the ratios.
+//! `tumble bench`: the speed on this machine, compared with its speed of writing memory and with code that a user would
+//! write. All contestants are measured alternately in one run, because machines are shared and their clock rates
+//! change. Only the ratios are meaningful.
 
 pub(crate) mod characters;
 pub(crate) mod device;
@@ -228,7 +228,7 @@ fn measure(
     Ok(Section::new(kind, method, count, rows))
 }
 
-/// Keys and results stay on the device, whose clock counts; `None` if it has none.
+/// Keys and results stay on the device, whose clock measures the time; `None` if it has no clock.
 fn resident<'a>(
     device: &BenchDevice,
     clip: &'a Clip,

@@ -40,7 +40,7 @@ use crate::messages::drawn::check_has_tracks;
 use crate::messages::exit::{ALL_INPUTS, Failure};
 use crate::messages::words;
 
-/// How a clip's rotations come to where they are written.
+/// How the rotations of a clip are evaluated for their output.
 #[derive(Debug, Clone, Copy)]
 enum Delivery {
     InMemory,
@@ -476,7 +476,7 @@ impl EvaluationJob<'_> {
         self.written(name, clips, &times, target, None)
     }
 
-    /// A clip whose keys have the root motion that is asked for.
+    /// The clip after its keys were changed to the requested root motion.
     fn treated_keys<'b>(
         &mut self,
         name: &str,
@@ -768,7 +768,7 @@ impl EvaluationJob<'_> {
         Ok(self.evaluated(extent, written, order))
     }
 
-    /// The scalars of a clip, `[frame][scalar]`, or how fast they change.
+    /// The scalars of a clip, `[frame][scalar]`, or their velocities.
     fn scalars(
         &mut self,
         name: &str,

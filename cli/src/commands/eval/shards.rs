@@ -117,8 +117,8 @@ fn run_shards(
     FailedInputs::of_codes(codes.into_iter()).outcome_of(inputs)
 }
 
-/// The inputs that failed, if shards were merged and there is nothing to make for these: all other inputs have their
-/// results. A task that is queued again then changes nothing.
+/// If the shards were merged and all inputs have their results except those that failed: the inputs that failed. A task
+/// that a scheduler runs again then changes nothing.
 fn merged_part(
     evaluator: &Evaluator,
     arguments: &Arguments,

@@ -32,7 +32,7 @@ pub(crate) struct ProofOptions {
     pub(crate) run_lanes: Option<RunLanes>,
 }
 
-/// A random round of so many seconds is reported.
+/// A random round that takes at least this many seconds is reported.
 const LONG_ROUND_SECONDS: u64 = 5;
 
 /// Shares of the time that is allowed, by the end of which a step starts nothing more.
@@ -263,7 +263,7 @@ impl ProofRun<'_> {
         }
     }
 
-    /// Runs a step where that share of the time is not over.
+    /// Runs a step if less than this share of the time limit has passed.
     fn step_if_time(
         &mut self,
         name: &str,

@@ -336,8 +336,8 @@ impl Scene {
 }
 
 impl Camera {
-    /// Adds a triangle as it is seen, moved aside and so much nearer to the eye; nothing if it shows its
-    /// back or nothing of itself.
+    /// Adds a triangle as the camera sees it, after moving it by `shift` and by `nearer` towards the eye. Adds nothing
+    /// if its back is turned to the camera or if it is not visible.
     fn add(&self, corners: &mut Vec<(Vec4, Colour)>, face: &Face, shift: Vec3, nearer: f32) {
         let seen = face.corners.map(|corner| {
             let corner = corner + shift;

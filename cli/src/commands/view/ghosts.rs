@@ -20,7 +20,7 @@ impl FoundGhosts {
         self.ghosts.is_empty()
     }
 
-    /// Gives the clips their ghosts, and prints what is to be known about these.
+    /// Gives the clips their ghosts, and prints the notes about the ghosts.
     pub(crate) fn give(self, shown: &mut [ShownClip]) {
         self.notes.iter().for_each(|note| words::note(note));
         for (index, ghost) in self.ghosts {

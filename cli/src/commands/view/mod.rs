@@ -318,8 +318,8 @@ impl Arguments {
         fitting(shown, choices_by(&asked))
     }
 
-    /// The frames, and the keys between them where those are not many more: a key is
-    /// shown as it is.
+    /// The samples that are shown: the frames and, if there are not many more, the keys between them, so that keys are
+    /// shown exactly.
     fn sampled(&self, one: ShownClip) -> Result<ShownClip, Failure> {
         let (name, outside) = (&one.name, self.interpolation.outside());
         let frames = in_frames(self.fps, [self.start, self.end], &one.clip, outside, name)?;
