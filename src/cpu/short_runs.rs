@@ -114,7 +114,7 @@ impl<'a> ShortRuns<'a> {
 /// Evaluates samples of polynomials one by one, all of a segment in succession.
 struct Polynomials<'a> {
     plan: &'a IntervalPlan,
-    /// Of each interval.
+    /// The source of each interval.
     sources: &'a [StoredSource],
 }
 

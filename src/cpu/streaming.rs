@@ -14,8 +14,8 @@ use crate::simd::lanes::Lanes;
 use crate::time::runs::Affine;
 use crate::twin::Evaluate;
 
-/// The minimum size in bytes of a result for streaming stores: the caches would contain so little of it that its reader
-/// does not benefit.
+/// The minimum size in bytes of a result for streaming stores. Of such a result, the caches could keep so little that
+/// its reader would not benefit.
 const LONG: usize = 32 << 20;
 
 /// The minimum number of samples of a row for which streaming stores save more time than staging takes.
@@ -36,7 +36,7 @@ pub(crate) struct Stage<'o> {
 
 /// The destination of consecutive rows in an encoding.
 pub(crate) enum RowStage<'o> {
-    /// As four f32 per value.
+    /// Values of four f32, for which rows may be staged.
     Values(Stage<'o>),
     Encoded(EncodedStage<'o>),
 }

@@ -15,8 +15,8 @@ use crate::twin::arc_between::arc_between;
 use crate::twin::evaluate_arc::{norm_squared, on_arc};
 use crate::twin::small_angle::{SmallAngleCubic, small_angle_cubic};
 
-/// The maximum number of samples of a lane; the others of a longer interval are in further lanes, so that all lanes
-/// have about as many.
+/// The maximum number of samples of a lane. An interval with more samples takes several lanes, so that all lanes have
+/// about the same number.
 const SAMPLES: usize = 8;
 
 /// With fewer lanes most of a vector would be unused; then the samples of several tracks share vectors.

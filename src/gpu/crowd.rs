@@ -510,7 +510,8 @@ mod tests {
         }
     }
 
-    /// A driver compiles it wrongly: the kernel with the memory of workgroups takes its place, and the report says so.
+    /// If a driver compiles the kernel wrongly, the kernel that uses workgroup memory is used instead, and the report
+    /// says so.
     #[test]
     fn a_kernel_by_subgroups_that_differs_is_replaced() {
         use crate::gpu::pipeline::faults::MISCOMPILED;

@@ -112,7 +112,7 @@ fn is_trusted(metadata: &fs::Metadata) -> bool {
 }
 
 /// Whether a file's permissions let only its owner write it, and the owner is this user or the system's administrator.
-/// Where the system does not say whose the process is, only the permissions count.
+/// If the user of the process is unknown, only the permissions count.
 #[cfg(unix)]
 fn is_private(owner: u32, mode: u32, user: Option<u32>) -> bool {
     let is_of_user = user.is_none_or(|user| [user, 0].contains(&owner));

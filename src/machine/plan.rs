@@ -1,6 +1,6 @@
-//! The choice of a route, once for each request. A [`Plan`] says how a request is evaluated; it is made from the
-//! request and the [`Limits`] of a machine, and knows no device. Every public function of the engine that evaluates
-//! makes a plan and carries it out; `explain` prints the plan.
+//! The choice of a route, once for each request. A [`Plan`] says how a request is evaluated; it depends only on the
+//! request and the [`Limits`] of a machine, not on a device. Every public function of the engine that evaluates makes a
+//! plan and carries it out; `explain` prints the plan.
 //!
 //! Every route gives the same bits; routes differ in the segments that they prepare and keep. If a set has fewer
 //! samples than keys, most prepared segments would never be used, and a set larger than memory cannot be prepared as
@@ -92,7 +92,7 @@ pub(crate) enum Rows {
     /// do not have it.
     SparseSamples,
     /// In batches: a thread of the CPU prepares some intervals, evaluates them while their segments are in its cache,
-    /// and forgets them. For a device as [`Rows::SparseSamples`].
+    /// and drops them. With a device, the host does this, as for [`Rows::SparseSamples`].
     Batches {
         /// Whether a long track may be divided into several parts.
         cuts_tracks: bool,
@@ -170,8 +170,8 @@ const DENSE_BYTES: usize = 64 << 20;
 /// most of the time.
 const MIN_KEYS: usize = 256;
 
-/// The minimum number of keys of a track for which a piece is divided at a sample: both pieces prepare the intervals
-/// at the division, which are then few relative to the others.
+/// Pieces of a track with at least this many keys may be divided at a sample. Both pieces prepare the intervals at the
+/// division; with so many keys, these are only a small part.
 const KEYS_TO_CUT: usize = 8;
 
 impl Plan {
@@ -646,8 +646,8 @@ mod tests {
         }
     }
 
-    /// Catches a text that describes a route other than the one that is carried out, a door that decides by itself, and
-    /// a route with other bits.
+    /// Catches a text that describes another route than the one that is used, a function of the engine that does not
+    /// follow the plan, and a route with other bits.
     #[test]
     fn the_plan_that_is_printed_is_carried_out_by_every_door() {
         let (first, last) = (0.0, 3.9);

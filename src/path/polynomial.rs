@@ -111,7 +111,7 @@ impl Polynomial {
 mod tests {
     use super::*;
 
-    /// Catches a zero that is missed, and a rest that is not the direction beside it.
+    /// Catches a zero that is missed, and a quotient that is not the direction next to the zero.
     #[test]
     fn zeros_are_divided_out() {
         let direction = Polynomial([DVec3::X, DVec3::Y, DVec3::Z, DVec3::ZERO]);

@@ -64,13 +64,13 @@ pub(crate) struct PrepareRequest<'a> {
     /// Groups are made large from the start and not merged, because copying them together would take longer than one
     /// dispatch for each.
     pub(crate) large_groups: bool,
-    /// Arcs are listed for a device that computes them, where the list says all that it needs: not as
-    /// keys are authored, since arcs of more than half a turn are cut in f64.
+    /// Whether arcs are listed for a device that computes them. This is not possible with signs as authored, because
+    /// arcs of more than half a turn are divided in f64.
     pub(crate) lists_arcs: bool,
     /// The only timeline that will be sampled; intervals without a sample of it may be left out.
     pub(crate) only_for: Option<&'a Timeline>,
-    /// Whether polynomials are packed ([`Prepared::pack`]), which pays for clips that are kept; groups that are merged
-    /// are not.
+    /// Whether polynomials are packed ([`Prepared::pack`]). This is worth its time for clips that are kept; groups that
+    /// will be merged are not packed.
     pub(crate) packs: bool,
     /// Groups whose memory is reused.
     pub(crate) spare: Vec<Prepared>,

@@ -1,6 +1,6 @@
 //! Packed segments of clips that are kept on the CPU: the coefficients that are +0 are left out. Nearly all curves of
 //! recorded motion have small angles and need seven rows of eleven, 112 bytes instead of 176, so that samples read less
-//! memory. The index of a segment says its degree, and is in the span, which is read anyway.
+//! memory. The index of a segment contains its degree; it is stored in the span, which is read anyway.
 
 use bytemuck::TransparentWrapper;
 

@@ -424,8 +424,8 @@ impl SetRequest<'_> {
     }
 }
 
-/// The part of a set's time that samples must leave out for the intervals in it not to be prepared: finding the others
-/// takes a search in the key times of every track.
+/// If the samples leave out at least this part of a set's time, the intervals in that part are not prepared. For a
+/// smaller part, the search in the key times of every track would take longer than it saves.
 const LEFT_OUT: f64 = 0.25;
 
 #[cfg(test)]

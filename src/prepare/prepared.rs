@@ -387,7 +387,7 @@ impl Prepared {
     }
 }
 
-/// The segments of one group, all of one form and in one list: the others stay empty.
+/// The segments of one group. All have one form and are in the list of this form; the other lists are empty.
 #[derive(Debug, Clone)]
 pub(crate) struct Segments {
     pub(crate) form: Form,

@@ -316,8 +316,8 @@ mod tests {
         assert_eq!(on_threads(rayon::current_num_threads), Ok(count()));
     }
 
-    /// A worker of another library's pool that took up another task while it waits would meet the lock of
-    /// the task below on its own stack.
+    /// Catches a worker of another library's pool that starts another task while it waits: the task would wait for the
+    /// lock of the task that is interrupted on the same stack.
     #[test]
     fn a_callers_worker_that_waits_takes_up_no_other_task() {
         let callers = rayon::ThreadPoolBuilder::new()

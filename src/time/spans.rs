@@ -36,7 +36,7 @@ pub(crate) enum SpanSource {
     Exact(u32),
 }
 
-/// A [`SpanSource`] in the four bytes that a span keeps: the kind in the two highest bits, and the index.
+/// A [`SpanSource`] in four bytes, as a span stores it: the kind in the two highest bits, and the index.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct StoredSource(u32);
 
@@ -83,7 +83,7 @@ pub(crate) struct TrackPart {
     /// The index of its first key in the track.
     pub(crate) first_key: u32,
     pub(crate) spans: Range<usize>,
-    /// Where the last span ends in seconds.
+    /// The end of the last span in seconds.
     pub(crate) end: f64,
     /// The constant held before the first key; [`NONE`] when another part has it.
     pub(crate) before: u32,
@@ -96,7 +96,7 @@ pub(crate) struct TrackPart {
 /// Data for a track's ends and the time outside its keys.
 #[derive(Debug, Clone)]
 pub(crate) struct TrackExtension {
-    /// The constant at exactly the last key; [`NONE`] if the one held after it serves there too.
+    /// The constant at exactly the last key; [`NONE`] if it is the same as the constant that is held after the key.
     pub(crate) at_end: u32,
     /// The curves, evaluated in f64, that extrapolate before the first key and after the last.
     /// Their parameter is seconds from that key; [`NONE`] where constants are held.

@@ -85,7 +85,7 @@ impl<T: Stored, const N: usize> Stored for [T; N] {
     }
 }
 
-/// Where the members of a struct lie, in words.
+/// The offsets of the members of a struct, in words.
 macro_rules! stored {
     ($name:ident, ($($generic:tt)*), $words:literal $(, $member:ident $offset:literal)+) => {
         stored!(@ $name, [$($generic)*], $words $(, $member $offset)+);
@@ -209,7 +209,7 @@ pub(crate) trait Machine {
     /// Begins a block of `steps` operations, in a line of the generated file.
     fn block(&self, line: u32, steps: usize) -> Self::Block;
 
-    /// Shows a word to the other lanes of the subgroup, or nothing more.
+    /// Sets the word that the other lanes of the subgroup can read; with `None` they can read none any more.
     fn show(&self, word: Option<u32>);
 
     /// The word that a lane of the subgroup shows.

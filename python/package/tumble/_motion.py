@@ -83,7 +83,7 @@ _ALL: tuple[_Name, ...] = (*_NAMES, *_SCALARS, *_BODIES)
 _SHAPES: dict[str, tuple[int, ...]] = {"quaternion": (4,), "matrix": (3, 3), "6d": (6,), "rotvec": (3,)}
 # Arrays in a file start at a multiple of this [bytes]: the alignment of every processor, and a cache line.
 _ALIGNED = 64
-# The latest version, which files with mirrored clips have.
+# The latest version of the file format; files with mirrored clips have it.
 _VERSION = 3
 # Members of every file, in addition to those that the extension module requires.
 _STORED = ("version", "method", "names", "lengths", "rates")
@@ -432,7 +432,7 @@ class MotionLibrary(Generic[_A]):
         kept = [index for index in range(len(clips)) if index not in left_out]
         self.names = [all_names[index] for index in kept]
         self.paths = [os.fspath(clips[index].path or "") for index in kept]
-        # By these shards divide clips: the index of each in the list, or that of its file among all files.
+        # The numbers by which shards divide clips: the index of a clip in the list, or of its file among all files.
         self._shard_indices = np.array(kept, np.int64)
         self._skipped_indices = list(left_out)
         self.lengths = np.array([clips[index].duration for index in kept])
@@ -449,7 +449,7 @@ class MotionLibrary(Generic[_A]):
         }
         self._file: str | None = None
         self._only: NDArray[np.int64] | None = None
-        # The indices in the library's file.
+        # The indices of the clips in the library's file.
         self._in_file: NDArray[np.int64] | None = None
         self._mirrored: _Mirrored | None = None
         self._put_on(device)
@@ -598,7 +598,7 @@ class MotionLibrary(Generic[_A]):
                 raise InputError(f"no file could be read; the first: {skipped[0][1].message}")
             if shard is not None:
                 raise InputError(f"shard: none of the {len(paths)} files is for process {rank} of {processes}")
-        # The joints have the order of the first clip of all files, whichever process it belongs to.
+        # The joints have the order of the first clip of all files, also in processes that do not read this clip.
         before: list[tuple[int, Clip]] = []
         if skeleton is None and robot is None:
             for index in range(clips[0][0] if clips else 0):
@@ -997,7 +997,7 @@ class MotionLibrary(Generic[_A]):
         if self._bodies:
             self._fill_bodies(ids, moments, finite, filled)
             return out
-        # Quaternions that the result does not have, or has in another representation.
+        # Quaternions that are needed but not requested, or requested in another representation.
         quaternions = {
             name: _aligned((ids.size, self._motions.joints, 4))
             for name in ("rotations", "world_rotations")

@@ -265,8 +265,8 @@ mod tests {
         assert_eq!(bytes(true), 2_113_536);
     }
 
-    /// An item of the work list asks for the filter of tiny components wherever the arc may need it, and seldom
-    /// beside that.
+    /// An item of the work list has the mark for the filter of tiny components whenever the arc may need it, and seldom
+    /// otherwise.
     #[test]
     fn tiny_components_are_expected_where_they_may_be() {
         let set = keys_of_all_kinds(200, 100);

@@ -254,9 +254,10 @@ impl VulkanEngine {
         Ok(None)
     }
 
-    /// Whether the engine evaluates with a kernel where others could take its place: the device runs it, and its bits are
-    /// the CPU's. A kernel that differs is refused here even if inexact devices are allowed, because the others need not
-    /// differ; it is listed as [`replaced`](KernelCheck::replaced). Other errors are left to the first use of the kernel.
+    /// Whether the engine uses a kernel that other kernels can replace: it does if the device runs it and gives the
+    /// CPU's bits. A kernel that differs is refused here even if inexact devices are allowed, because the others need
+    /// not differ; it is listed as [`replaced`](KernelCheck::replaced). Other errors are left to the first use of the
+    /// kernel.
     pub(crate) fn uses(&self, kernel: Kernel) -> bool {
         if !Pipeline::can_run(&self.device, kernel) {
             return false;

@@ -196,7 +196,7 @@ impl<S: Segment> SegmentInputs<S> {
         });
     }
 
-    /// A segment, or a constant and the bit that says so.
+    /// The index of a segment, or the index of a constant with the bit that marks constants.
     fn source(random: &mut Random) -> (u32, u32) {
         match random.once_in(8) {
             true => (random.below(CONSTANTS as u32), IS_CONSTANT),
@@ -370,7 +370,7 @@ impl<S: Segment> SegmentInputs<S> {
         self.finish(listed, &dispatch, groups)
     }
 
-    /// The run of an item, which may begin with a key; in frames far from the middle, it says so.
+    /// The run of an item, which may begin with a key. If its frames are far from the middle, it has the mark for this.
     fn run(
         &self,
         random: &mut Random,

@@ -30,8 +30,8 @@ const OTHER_WORK: vk::QueueFlags = vk::QueueFlags::from_raw(
         | vk::QueueFlags::OPTICAL_FLOW_NV.as_raw(),
 );
 
-/// The family of the queue that computes: the first with compute and without graphics, which a desktop keeps busy;
-/// otherwise the first with compute.
+/// The family of the queue that computes: the first with compute and without graphics, because a desktop keeps graphics
+/// queues busy; otherwise the first with compute.
 pub(crate) fn compute_family(families: &[vk::QueueFamilyProperties]) -> Option<u32> {
     use vk::QueueFlags as Flags;
     let computes = |family: &vk::QueueFamilyProperties| {
