@@ -26,14 +26,15 @@ use crate::run::interruptible;
 /// the lengths of the legs, or a number. `axes`: the rotation x y z w from the axes of the source to those of the
 /// target; by default it is derived from the positions of hips, head and legs.
 ///
-/// Rotations away from the rest pose are the same in the world. Times are the source's. Joints without a partner keep
-/// their rest rotations, and translations of joints other than the hips are lost. The report is a dict: `pairs`, `resting`,
-/// `dropped`, `furthest_dropped` (the one of these that rotates furthest from its rest, and the degrees, or None),
-/// `aligned` (degrees by joint), `scale`, `axes`, `axes_assumed`, `dropped_translation`, `largest_difference`
-/// (rad, of rounding), `ends` (how far hands and feet come away from the source's, in heights of the hips), `below_ground`,
-/// `stood_along` (the axis along which an SMPL body stands, if it is found and not y: the motion was rotated to y up; or None),
-/// `rests_along` (the axes along which the body stands in its rest pose and in the motion, if they differ: give
-/// `rest_frame`; or None).
+/// In the world, each joint rotates away from its rest pose as its partner does. Times are those of the source.
+/// Joints without a partner keep their rest rotations; translations of joints other than the hips are lost. The
+/// report is a dict: `pairs`, `resting`, `dropped`, `furthest_dropped` (of the dropped joints, the one that rotates
+/// furthest from its rest pose, with the angle in degrees; or None), `aligned` (degrees by joint), `scale`, `axes`,
+/// `axes_assumed`, `dropped_translation`, `largest_difference` (rad, caused by rounding), `ends` (the largest
+/// distances of hands and feet from those of the source, in heights of the hips), `below_ground`, `stood_along`
+/// (the axis along which an SMPL body stands, if it was found and is not y; the motion was then rotated to y up;
+/// else None), `rests_along` (the axes along which the body stands in its rest pose and in the motion, if these
+/// differ; then give `rest_frame`; else None).
 ///
 /// >>> import tumble
 /// >>> keys = [[[0, 0, 0, 1], [0, 0, 1, 0]], [[0, 0, 0, 1], [0, 0, 0, 1]]]

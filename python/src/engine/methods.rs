@@ -269,10 +269,10 @@ impl Engine {
         )
     }
 
-    /// The angular velocity of every track at every sample: float32, (tracks, frames, 3) in rad/s,
-    /// about the axes of the "body" or of its "parent", or in the "world": that of the rotation in the world,
-    /// along the skeleton, about the world's axes. Of a track without a parent the last two are the same. Other
-    /// keywords are those of `evaluate`.
+    /// The angular velocity of every track at every sample: float32, (tracks, frames, 3) in rad/s, about the axes of
+    /// the "body" or of its "parent". With "world" it is the angular velocity of the joint in the world, along the
+    /// skeleton, about the world's axes. For a track without a parent, "parent" and "world" are the same. All other
+    /// keywords are as in `evaluate`.
     ///
     /// >>> import tumble
     /// >>> clip = tumble.Clip([0.0, 2.0], [[0, 0, 0, 1], [0, 0, 1, 0]])
