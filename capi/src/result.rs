@@ -21,8 +21,8 @@ pub enum TumbleResult {
     /// A handle is null, was freed, never existed, or belongs to an object of another type.
     InvalidHandle = 2,
     /// An argument is invalid: an unknown constant or name, a number out of its range, an array that is too large for
-    /// memory, a structure whose `size` is that of no version or of a newer one, text that is not UTF-8, or objects that
-    /// do not belong together.
+    /// memory, a structure whose `size` is not that of a known version, text that is not UTF-8, or objects that do not
+    /// belong together.
     InvalidArgument = 3,
     /// The memory for a result does not have the required size, or a range of a buffer is too short or not aligned.
     WrongSize = 4,
