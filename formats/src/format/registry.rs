@@ -9,7 +9,7 @@ use crate::pickle;
 use crate::source::{START, Source};
 
 impl Format {
-    /// How the names of its files end by default: the first of its extensions that readers look for, or its name.
+    /// The default extension of its files: the one that programs look for, or else the format's name.
     #[must_use]
     pub fn ending(&self) -> &'static str {
         match self.name {
