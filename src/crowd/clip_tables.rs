@@ -399,7 +399,7 @@ impl ClipTables {
         clock: (FrameRate, FrameStart, u32),
     ) -> Result<Vec<ChannelCurve>, CrowdError> {
         let joints = 0..set.track_count();
-        // Where keys are enough, no arc is computed.
+        // If the tables can store keys, the arcs between them are not computed.
         let are_from_keys = form == FORM_ARC
             && interpolation.signs == KeySigns::Shortest
             && interpolation.speed == Speed::AsKeyed;

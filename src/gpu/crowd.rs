@@ -277,7 +277,7 @@ impl CrowdTarget {
         let windows = [crowd.window(), room];
         let recording = &mut work.recording;
         let stages = Stages::new(recording, shape, kernels, &resources, windows);
-        // As for frames.
+        // Recorded once now, for the same reason as frames.
         stages.record(recording, room);
         work.bind(|kernel| engine.pipeline(kernel))?;
         Ok(Self {

@@ -171,8 +171,8 @@ with_fields! {
 }
 
 /// How many neighbouring invocations of a graphics card evaluate a run of samples together, track by track, for runs of
-/// each class of lengths ([`RunLanes::CLASSES`]). Only powers of two from 4 to 32 are used: other numbers are as the next
-/// smaller one, or the nearest of these.
+/// each class of lengths ([`RunLanes::CLASSES`]). Only powers of two from 4 to 32 are used. Other numbers are rounded
+/// down to a power of two; numbers outside 4 to 32 count as 4 or 32.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct RunLanes(pub [u32; 5]);

@@ -356,7 +356,7 @@ impl ManifestLines {
             .collect();
         let mut pending: BTreeSet<&str> =
             in_state(InputState::Pending).map(|it| &*it.input).collect();
-        // A batch was stopped between the clips of an input.
+        // An input is pending, too, if some of its clips have no result: the batch was stopped between these clips.
         let mut clips: BTreeMap<(&str, usize), (usize, &str)> = BTreeMap::new();
         for entry in self.entries.values() {
             clips.entry(entry.whole()).or_insert((0, &entry.input)).0 += 1;

@@ -481,7 +481,7 @@ impl FbxReader<'_> {
                 return Err(too_large(reason));
             }
         }
-        // Keys that follow a curve may lie on other frames.
+        // Keys that were added to follow a curve may be at frames of another rate, which is not the clip's.
         let is_of_file = |rate: &FrameRate| [self.rate, takes.rate].contains(&Some(*rate));
         clip.rate = clip.rate_of_keys().filter(is_of_file);
         Ok(clip)
