@@ -16,14 +16,14 @@ const LARGEST: i128 = 100_000_000_000_000 * SECOND;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Decimal(i128);
 
-/// If the first time is at least this many seconds from 0, times count from its whole second: the step of an f64 of
-/// Unix seconds is 0.2 µs, and one that starts at 0 keeps nanoseconds for 104 days.
+/// If the first time is at least this many seconds from 0, times count from its whole second. The reason is that an f64
+/// of seconds since 1970 has steps of 0.2 µs; seconds from 0 are exact to a nanosecond for 104 days.
 const OFFSET_LIMIT: u64 = 1_000_000;
 
-/// Larger times are not seconds since 1970: it is the year 5138.
+/// The largest time that is taken for seconds since 1970; it is in the year 5138.
 pub(crate) const LARGEST_SECONDS: f64 = 1e11;
 
-/// The whole second from which times count whose first one has the whole second `first`.
+/// The whole second from which times count, if `first` is the whole second of the first time.
 pub(crate) fn offset_of(first: i64) -> i64 {
     match first.unsigned_abs() < OFFSET_LIMIT {
         true => 0,
@@ -55,8 +55,8 @@ pub(crate) fn decimal_count(token: &str, power: i32) -> u32 {
     exact.saturating_add(power).min(0).unsigned_abs()
 }
 
-/// The power of ten of the last digit that the f64 of a number determines, if the number has more digits and they are
-/// those of this f64. `last` is the power of its last digit.
+/// For a number that is the decimal expansion of an f64 with more digits than the f64 determines: the power of ten of
+/// the last digit that it determines. Otherwise `None`. `last` is the power of the number's last digit.
 fn f64_power(token: &str, last: i32) -> Option<i32> {
     let mantissa = token.split(['e', 'E']).next().unwrap_or_default();
     let digits = mantissa.bytes().filter(u8::is_ascii_digit);

@@ -466,7 +466,8 @@ fn shortest(number: f64, near: f64) -> f64 {
     decimals.into_iter().find(is_near).unwrap_or(number)
 }
 
-/// The frames of times; `None` if they cannot be distinguished.
+/// The windows of time in which the frames can be; times whose windows overlap count as one time. `None` if fewer than
+/// two windows remain.
 fn windows(times: &[f64], precision: Precision) -> Option<Vec<TimeWindow>> {
     let mut all: Vec<TimeWindow> = Vec::new();
     for &time in times {

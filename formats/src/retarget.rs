@@ -45,12 +45,13 @@ pub struct RetargetOptions {
 /// How the rest poses of two skeletons are compared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum RestAlignment {
-    /// By directions if those of a limb differ by more than 5°, else as the same.
+    /// [`Directions`](Self::Directions) if the directions of a limb differ by more than 5°, otherwise
+    /// [`Same`](Self::Same).
     #[default]
     Auto,
-    /// Both stand alike: nothing is aligned.
+    /// The rest poses are the same: nothing is aligned.
     Same,
-    /// The limbs of the target are turned to the directions of the source's.
+    /// The limbs of the target's rest pose are rotated to the directions that the source's limbs have at rest.
     Directions,
 }
 
@@ -122,7 +123,7 @@ pub enum RetargetError {
         /// `source` or `target`.
         which: &'static str,
     },
-    /// A skeleton's joints have no names that are known.
+    /// The names of a skeleton's joints are not known.
     #[error(
         "the joints of the {which} are not those of a known human skeleton: {}; pair them by `bones`",
         missing_text(missing)
@@ -136,7 +137,7 @@ pub enum RetargetError {
     /// The positions of the source's joints are not known.
     #[error("{0}")]
     NoPositions(String),
-    /// A joint of `bones` does not exist, or is there twice.
+    /// A joint in `bones` does not exist, or occurs twice.
     #[error("bones: the {which} has no joint `{name}`, or it is paired twice")]
     Bone {
         /// `source` or `target`.
@@ -158,7 +159,7 @@ pub enum RetargetError {
     /// The keys of the source are at different times.
     #[error(transparent)]
     Keyed(#[from] KeyedError),
-    /// The parents are no hierarchy.
+    /// The parents do not form a hierarchy.
     #[error(transparent)]
     Hierarchy(#[from] HierarchyError),
     /// The motion cannot be stored.
@@ -257,7 +258,7 @@ impl<'a> Rig<'a> {
     }
 }
 
-/// Some samples of a motion, up to 64.
+/// The indices of up to 64 samples of a motion, spread evenly.
 fn some_of(samples: usize) -> impl Iterator<Item = usize> {
     (0..samples).step_by(samples.div_ceil(64).max(1))
 }
@@ -545,7 +546,7 @@ struct Ends {
     /// The hips of the source and of the target, and their heights above the ground.
     hips: [(usize, f64); 2],
     up: DVec3,
-    /// How high the target's lowest joint is at rest.
+    /// The height of the target's lowest joint at rest.
     ground: f64,
     /// Hands and feet: of the source and of the target, whether it is a foot, and the largest distance so far.
     all: Vec<([usize; 2], bool, f64)>,
@@ -659,7 +660,7 @@ pub fn furthest_from_t_pose(clip: &Motion, roles: &Roles) -> Option<([usize; 2],
 struct Pairs {
     /// The joint of the source for each joint of the target.
     source_of: Vec<Option<usize>>,
-    /// The joints whose way is followed: of the target and of the source.
+    /// The hips of the target and of the source: the target's hips follow the path of the source's.
     hips: Option<(usize, usize)>,
 }
 
@@ -671,7 +672,8 @@ impl Pairs {
         Self { source_of, hips }
     }
 
-    /// The joints of both skeletons that have one role, and those without a role that have one name below partners.
+    /// Pairs the joints of both skeletons that have the same role; and, below these, joints without a role that have
+    /// the same name.
     fn by_roles(
         from: &Rig<'_>,
         to: &Rig<'_>,
@@ -756,7 +758,7 @@ impl Pairs {
         pairs.map(names).collect()
     }
 
-    /// The nearest joint above that has a partner.
+    /// The nearest ancestor that has a partner.
     fn above(&self, to: &Rig<'_>, joint: usize) -> Option<usize> {
         let mut above = to.parents[joint];
         while let Some(next) = above.filter(|&next| self.source_of[next].is_none()) {

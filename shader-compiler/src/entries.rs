@@ -150,7 +150,7 @@ fn functions<'a>(kernel: &Source<'a>) -> Vec<One<'a>> {
 }
 
 impl One<'_> {
-    /// Its parameters with its result, and the arguments that pass them on.
+    /// The function's parameters with its result as text, and the arguments of a call that passes these parameters on.
     fn signature(&self, types: &Types<'_>) -> (String, String) {
         let ty = |ty| types.name(ty).unwrap_or_default();
         // The arguments of an entry point are provided by the machine.

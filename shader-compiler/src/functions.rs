@@ -96,7 +96,7 @@ const BY_HAND: [(&str, &str); 4] = [
 /// stay functions of f32, whose `if` evaluates one side only.
 const CHOOSING: [&str; 1] = ["small_angle_cubic"];
 
-/// Why a function cannot be written in a form.
+/// A result, or the reason why a function cannot be written in a form.
 pub(crate) type Result<T> = std::result::Result<T, String>;
 
 /// The types of numbers that a function takes.
@@ -111,7 +111,7 @@ enum Numbers {
 /// How a function takes vectors.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Vectors {
-    /// As one number: it treats all components alike.
+    /// The function is written for one number, because it treats all components alike.
     Alike,
     /// As arrays of components.
     Apart,
@@ -122,7 +122,7 @@ enum Vectors {
 struct Shape {
     numbers: Numbers,
     vectors: Vectors,
-    /// Whether any numbers can be compared.
+    /// Whether the numbers, of any type, can be compared.
     chooses: bool,
 }
 
@@ -990,7 +990,8 @@ impl<'a> Writer<'a> {
         Err("a vector without this component".to_owned())
     }
 
-    /// A struct, an array, or where components are alike a vector that has one number in all of them.
+    /// A struct, an array, or a vector; if components are treated alike, the vector must have the same number in all
+    /// components.
     fn composed(&mut self, ty: Handle<Type>, components: &[Handle<Expression>]) -> Result<Text> {
         let parts: Result<Vec<String>> = components.iter().map(|&part| self.whole(part)).collect();
         let parts = parts?;
@@ -1211,7 +1212,7 @@ impl<'a> Writer<'a> {
         }
     }
 
-    /// The number in all components, or the only one.
+    /// The number that all components of a vector have, or the number itself.
     fn in_all(&self, handle: Handle<Expression>) -> &'a Expression {
         match &self.function.expressions[handle] {
             Expression::Splat { value, .. } => self.in_all(*value),

@@ -148,7 +148,7 @@ fn compile() -> Files {
     files
 }
 
-/// The files that are not as they should be, to the byte.
+/// The paths of the files that are missing under `root` or have other bytes there.
 fn stale(root: &Path, files: &Files) -> Vec<&'static str> {
     let stale = files
         .iter()

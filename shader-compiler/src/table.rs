@@ -409,7 +409,7 @@ const WHOLE: [&str; 8] = [
     "crowd/whole",
 ];
 
-/// Files of those that evaluate matrices.
+/// Files of the crowd kernels that evaluate matrices.
 const WHOLE_MATRICES: [&str; 5] = [
     "math/matrix",
     "crowd/transform",
@@ -461,7 +461,7 @@ const CROWD_SUBGROUPS: [&str; 9] = [
     "crowd/ticks",
 ];
 
-/// Each with the files that store.
+/// The kernels over subgroups, each with the files that store its results.
 const CROWD_SUBGROUP_STORES: [(&str, &[&str]); 2] = [
     ("subgroup_rotations", &["stores/f32"]),
     ("subgroup_rotations_f16", &["math/half", "stores/f16"]),

@@ -28,7 +28,8 @@ pub(crate) struct ShortRuns<'a> {
     clock: FrameClock,
     samples: Range<usize>,
     width: VectorWidth,
-    /// The tracks for which samples were found, of [`ClipData::time_classes`].
+    /// The number in [`ClipData::time_classes`] of the tracks for which `plan` is: other tracks with the same number
+    /// use it, too.
     class: u32,
     frames: FramePlan<'static>,
     plan: IntervalPlan,
@@ -67,7 +68,7 @@ impl<'a> ShortRuns<'a> {
         })
     }
 
-    /// Evaluates the samples of a track; returns whether it can be evaluated so.
+    /// Evaluates the samples of a track; returns false if the track must be evaluated by the general path.
     pub(crate) fn row(&mut self, track: usize, output: &mut [[f32; 4]]) -> bool {
         let class = self.clip.time_classes()[track];
         let Some(PartRef { prepared, part }) = self.clip.only_part(track) else {

@@ -57,7 +57,7 @@ pub(crate) fn fill(
     }
 }
 
-/// Evaluates a request in rows, and copies them into frames if the result is to be so.
+/// Evaluates a request in rows, and copies them into frames if the result is frame by frame.
 #[cfg(not(smallest))]
 fn fill_rows(
     machine: &Arc<dyn Machine>,

@@ -132,8 +132,8 @@ struct Stream {
     segment_bytes: usize,
 }
 
-/// The number of values of tracks with one of several interpolations that are evaluated before they are copied to
-/// their places: the memory that this takes.
+/// The number of values of tracks with one of several interpolations that are evaluated before they are copied to their
+/// places. It limits the memory of these values.
 const GROUP_VALUES: usize = 1 << 22;
 
 /// How many tracks with one of several interpolations are evaluated before their values are copied to their places.
@@ -141,8 +141,8 @@ pub(crate) fn tracks_at_once(samples: usize) -> usize {
     (GROUP_VALUES / samples.max(1)).max(1)
 }
 
-/// The number of samples for each key from which the CPU prepares segments: a segment's samples side by side in vectors
-/// then cost less than its curve in a lane saves.
+/// The number of samples for each key from which on the CPU prepares segments. With fewer samples, it is faster to
+/// compute the curve of each interval while its samples are evaluated.
 const SAMPLES_OF_A_KEY: usize = 8;
 
 /// Rotations for which another thread is worth waking.

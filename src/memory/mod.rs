@@ -97,7 +97,8 @@ fn left(swap: Swap) -> Option<u64> {
 }
 
 /// The part of a system's free memory that a container's limit leaves: the limit without the memory of its processes.
-/// Files that it has in memory give way. A limit of all memory is none.
+/// Memory that caches files counts as free, because the system frees it when it is needed. A limit that is not less
+/// than the whole memory is ignored.
 #[cfg(not(target_family = "wasm"))]
 fn within_limits(free: u64, total: u64, limits: Option<(u64, u64)>) -> u64 {
     match limits {

@@ -89,7 +89,8 @@ pub(crate) struct TrackPart {
     pub(crate) before: u32,
     /// The constant held from the last key on; [`NONE`] when another part has it.
     pub(crate) after: u32,
-    /// Additional data for its ends, which are rarely needed. Boxed, because a crowd has a million parts.
+    /// Additional data for the ends of the track, which few tracks need. They are in a box, because a crowd has a
+    /// million parts.
     pub(crate) extension: Option<Box<TrackExtension>>,
 }
 

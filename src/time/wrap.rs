@@ -275,7 +275,7 @@ mod tests {
         }
     }
 
-    /// A billion copies out, each sample is where exact arithmetic has it.
+    /// Even in the billionth copy, each sample has the position that exact arithmetic gives.
     #[test]
     fn far_copies_lie_where_they_repeat() {
         let wrap = Wrap {

@@ -276,11 +276,11 @@ pub(crate) struct OnlyClip {
     pub(crate) clip: Motion,
     /// The file, unless the clip was converted to another unit or up axis.
     pub(crate) document: Option<Arc<dyn Document>>,
-    /// Fails where other animations of the file were refused: the result is then incomplete.
+    /// An error if other animations of the file were refused: the result is then incomplete.
     pub(crate) rest: Result<(), Failure>,
 }
 
-/// Fails where animations of an input were refused; the others are done by then.
+/// Returns an error if animations of an input were refused. It is called when the work on the other animations is done.
 pub(crate) fn check_complete(name: &str, loaded: &Loaded) -> Result<(), Failure> {
     let refused: u64 = loaded.refused.iter().map(|fault| fault.count).sum();
     if refused == 0 {
@@ -333,7 +333,7 @@ pub(crate) fn several_clips_failure(path: &Path, loaded: &Loaded) -> Failure {
 /// Files to work on, in order, each once.
 pub(crate) struct GatheredInputs {
     pub(crate) files: Vec<FoundInput>,
-    /// The command line has a directory, a pattern or a list: there may be any number of files.
+    /// Whether the command line has a directory, a pattern or a list, so that there may be any number of files.
     pub(crate) many: bool,
     /// Skipped entries of directories that are named like inputs: pipes, sockets, links in a circle.
     pub(crate) skipped: Vec<InputEntry>,
@@ -470,7 +470,7 @@ struct Expansion {
     found: Vec<FoundInput>,
     /// The number of inputs that `--exclude` leaves out. The files of a directory count only if none of them is left.
     excluded: usize,
-    /// The path is a pattern that no file matches.
+    /// Whether the path is a pattern that no file matches.
     is_unmatched: bool,
 }
 
@@ -494,7 +494,7 @@ impl FoundInput {
         }
     }
 
-    /// The same, whose result lies below the directory of results as it lies below `base`.
+    /// The same input, with a result at the same path below the directory of results as the input has below `base`.
     ///
     /// # Errors
     /// When it does not lie below `base`.
@@ -519,7 +519,8 @@ impl FoundInput {
 }
 
 impl FoundInput {
-    /// Whether it, or a directory above it in the directory that was named, is a symbolic link.
+    /// Whether the file is a symbolic link, or a directory above it is, up to the directory that the command line
+    /// names.
     fn is_below_link(&self) -> bool {
         let root = self.root.as_deref();
         let mut above = self.path.ancestors();
@@ -790,7 +791,7 @@ enum UnreadableEntry {
     Input,
     /// It leads to nothing new; with the reason.
     Skipped(String),
-    /// Nothing that would be an input.
+    /// An entry that could not be an input.
     Other,
 }
 

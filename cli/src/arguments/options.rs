@@ -1,7 +1,7 @@
-//! The options of a command line: which are explicit, the values of all, and, for the commands that write
-//! results, a row of [`OPTIONS`] each. It is all that the program knows of an option besides its value: whether
-//! it determines the bytes of results, and which inputs or results it applies to. An option that has no effect
-//! is refused, with a remedy, and never ignored. Manifests record those that determine bytes, by their names.
+//! The options of a command line: which are explicit, and the values of all. For the commands that write results, each
+//! option has a row in [`OPTIONS`]: whether it determines the bytes of results, and which inputs or results it applies
+//! to. An option that has no effect is refused, with a remedy, and never ignored. Manifests record the options that
+//! determine bytes, by their names.
 
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
@@ -288,7 +288,7 @@ pub(crate) const OPTIONS: &[OptionRule] = &[
     deciding("meshopt"),
 ];
 
-/// The names of options in manifests of before, as the text of a command begins, and the names since.
+/// Options that have been renamed: the command (as its text in a manifest begins), the old name and the new name.
 const RENAMED: &[(&str, &str, &str)] = &[
     ("", "output", "quantity"),
     ("", "path", "signs"),
@@ -388,7 +388,7 @@ pub(crate) fn rule(name: &str) -> Option<&'static OptionRule> {
 }
 
 impl ResultDescription<'_> {
-    /// Why an option has no effect, where `applies` is false.
+    /// The reason why an option has no effect, if `applies` is false.
     fn unless(&self, applies: bool, option: &str, wants: &str) -> Option<String> {
         (!applies).then(|| {
             format!(

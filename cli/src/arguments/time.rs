@@ -67,10 +67,11 @@ pub(crate) enum RateChoice {
     Number(FrameRate),
 }
 
-/// The lowest rate of keys that is one of frames. Keys that are further apart are those of a person, or of a slow log.
+/// The lowest rate of keys that is taken for a frame rate. Keys that are further apart were set by a person, or come
+/// from a slow log.
 const MIN_SOURCE_RATE: f64 = 10.0;
 
-/// The rate of frames where the keys have none.
+/// The rate of frames if the keys have no rate.
 const DEFAULT_RATE: u64 = 25;
 
 const SOURCE: &str = "source";
@@ -189,7 +190,7 @@ pub(crate) struct EndFrameArguments {
 }
 
 impl EndFrameArguments {
-    /// Whether the command line says it.
+    /// Whether the command line sets it.
     pub(crate) fn is_chosen(&self) -> bool {
         self.end_frame.is_some()
     }
@@ -234,11 +235,11 @@ fn end_frame() -> impl TypedValueParser<Value = EndFrame> {
 pub(crate) struct ClipFrames {
     /// The times at which it is evaluated.
     pub(crate) frames: SampleTimes,
-    /// The times written with the results, where those differ: a key is held there.
+    /// The times written with the results, if they differ from `frames`: in gaps, a key is held.
     held: Option<SampleTimes>,
     /// The sample at the end of the clip, after its frames.
     pub(crate) end: Option<EndSample>,
-    /// The seconds from the last frame to the end of the clip, where nothing follows the last frame.
+    /// The seconds from the last frame to the end of the clip, if no sample follows the last frame.
     pub(crate) left_out: Option<f64>,
     /// The rate of which all written times are neighbouring frames.
     pub(crate) rate: Option<FrameRate>,
@@ -394,8 +395,8 @@ impl SampleChoice {
         }
     }
 
-    /// Where the frames of a rate end in a clip, in seconds: at its last key or where the command line says; `None` for
-    /// listed times, or where neither is known.
+    /// The end of the frames of a rate in a clip, in seconds: the end that the command line sets, otherwise the last
+    /// key. `None` for listed times, or if there is neither.
     pub(crate) fn end_of(&self, clip: &Motion, outside: Outside) -> Option<f64> {
         let Self::Rate { end, .. } = *self else {
             return None;
@@ -611,8 +612,8 @@ pub(crate) fn finite_seconds(text: &str) -> Result<f64, String> {
 
 /// Parses the difference of two clocks.
 pub(crate) fn clock_difference(text: &str) -> Result<f64, String> {
-    /// Two clocks that count seconds, one from 1970 and one from the start of a recording, are not further apart: it
-    /// is the year 5138.
+    /// The largest difference of two clocks that count seconds, one from 1970 and one from the start of a recording:
+    /// 1970 to the year 5138.
     const LARGEST: f64 = 1e11;
     match finite_seconds(text)? {
         difference if difference.abs() <= LARGEST => Ok(difference),

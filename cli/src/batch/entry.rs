@@ -160,7 +160,7 @@ impl InputEntry {
         }
     }
 
-    /// The entry in a line; `None` if there is none, or where it names a result outside its directory.
+    /// The entry in a line; `None` if the line is not an entry, or if it names a result outside its directory.
     pub(crate) fn of_line(line: &[u8]) -> Option<Self> {
         let entry: Self = serde_json::from_slice(line).ok()?;
         entry
@@ -201,7 +201,7 @@ impl InputEntry {
 pub(crate) type InputEntries = BTreeMap<String, InputEntry>;
 
 impl ManifestEntry {
-    /// The entry in a line; `None` if there is none, or where it names a result outside its directory.
+    /// The entry in a line; `None` if the line is not an entry, or if it names a result outside its directory.
     pub(crate) fn of_line(line: &[u8]) -> Option<Self> {
         let mut entry: Self = serde_json::from_slice(line).ok()?;
         if let Cow::Owned(options) = with_present_names(&entry.options) {

@@ -48,18 +48,18 @@ pub(crate) struct Manifest {
     planned: PlannedResults,
     /// Whether results without an input are removed.
     prune: bool,
-    /// Whether there is a file of its name: a manifest, or a file to replace.
+    /// Whether a file with the manifest's name exists: a manifest, or a file to replace.
     exists: bool,
     /// The file to which lines are appended; `None` before the first line is written.
     journal: Option<File>,
-    /// Whether there are shards, whose lines become part of it.
+    /// Whether there are shards, whose lines become part of the manifest.
     has_shards: bool,
-    /// Locks the directory: two batches would lose each other's lines.
+    /// Locks the directory, because two batches would lose each other's lines.
     _lock: Option<File>,
 }
 
-/// The results of a batch's inputs, each of all clips of its input: they decide which earlier results have no input
-/// any more.
+/// The results that a batch plans, one for all clips of each input. They decide which earlier results have no input any
+/// more.
 #[derive(Default)]
 pub(crate) struct PlannedResults {
     names: BTreeSet<String>,
@@ -233,7 +233,8 @@ impl Manifest {
         self.append(&text)
     }
 
-    /// Appends a line that the fields have already.
+    /// Appends a line. Its entry must be in the fields already, because the first line is written with the lines of all
+    /// entries.
     fn append(&mut self, text: &str) -> Result<(), Failure> {
         match &mut self.journal {
             Some(journal) => {
@@ -377,7 +378,7 @@ impl Manifest {
         Ok(removed)
     }
 
-    /// Replaces the file whole, without the lines of some results; gives it, open at its end.
+    /// Replaces the whole file by one without the lines of some results; returns the new file, open at its end.
     fn replace(&self, without: &BTreeSet<String>) -> Result<Option<File>, Failure> {
         let output = Output::create_in(&self.opened, Path::new(NAME), self.exists, "");
         let mut output = output.map_err(|error| Failure::output(&error))?;

@@ -46,9 +46,9 @@ impl Owner {
 
 /// The commands that made the results of a directory.
 pub(crate) struct CommandsOfResults<'a> {
-    /// Those of each result of all clips of an input.
+    /// The command of each result of all clips of an input.
     of_results: BTreeMap<&'a str, &'a str>,
-    /// Those of the inputs that have no result.
+    /// The commands of the inputs that have no result.
     others: BTreeSet<&'a str>,
 }
 

@@ -64,11 +64,11 @@ struct CheckReport<'a> {
     /// Lines of the manifest that cannot be read.
     damaged_lines: usize,
     failed: Vec<&'a InputEntry>,
-    /// Inputs that the batch has not come to.
+    /// Inputs that the batch has not processed.
     pending: BTreeSet<&'a str>,
     /// Inputs and files of options that are not found, so that it is not known whether they have changed.
     not_found: BTreeSet<&'a str>,
-    /// Where the shards of a directory are not merged: how many are done.
+    /// If the shards of a directory are not merged: the number of shards that are done.
     #[serde(skip_serializing_if = "Option::is_none")]
     shards: Option<String>,
 }
@@ -85,11 +85,11 @@ struct FaultyResult<'a> {
 enum Fault {
     Damaged,
     Unreadable(io::Error),
-    /// It was written as a file, and is a link to something else.
+    /// The result was written as a file, but is now a link to something else.
     Link,
     /// This file has other bytes than those that it was made from.
     Stale(String),
-    /// The results of all clips that this input has now are there, and this one is of another clip.
+    /// The result is of a clip that this input does not have any more; the results of all clips that it has exist.
     RemovedClip(String),
 }
 
@@ -366,7 +366,7 @@ fn fault(folder: &Path, entry: &ManifestEntry, inputs: &InputHashes<'_>) -> Opti
     }
 }
 
-/// The present hashes of inputs, by their paths in the manifest. Inputs that are not found have none.
+/// The current hashes of inputs, by their paths in the manifest. Inputs that are not found have no hash.
 #[derive(Default)]
 struct InputHashes<'a> {
     inputs: BTreeMap<&'a str, Option<String>>,

@@ -301,7 +301,7 @@ impl Arguments {
         Ok(work.result(written, &done, None))
     }
 
-    /// The reason for a new file, where the input is not rewritten.
+    /// The reason why a new file is made; `None` if the input's file is written again.
     fn makes_new(&self, target: &ResultTarget) -> Option<&'static str> {
         let several = target.format().supports(Feature::SeveralClips);
         let chooses = self.inputs.reading.chooses_animation() && several;

@@ -29,9 +29,9 @@ pub(crate) struct Failure {
     message: String,
     /// Lines below it.
     more: Vec<String>,
-    /// The message is printed unchanged, without `error:` before it.
+    /// Whether the message is printed unchanged, without `error:` before it.
     plain: bool,
-    /// An output that cannot be written, where another one may be.
+    /// Whether one output cannot be written, but others may be.
     is_of_one: bool,
     /// The code of the first error of an input.
     input_code: Option<Code>,
@@ -148,7 +148,8 @@ impl Failure {
         Self::new(code, format!("{input}: {error}"))
     }
 
-    /// A result of an input does not fit into the memory that was free, if that is known. Another input's may.
+    /// A result of an input does not fit into memory; results of other inputs may fit. `free` is the memory that was
+    /// free.
     pub(crate) fn memory(input: &str, result: &str, bytes: f64, free: Option<u64>) -> Self {
         let limit = free.map_or_else(
             || "less memory is free".to_owned(),
@@ -195,12 +196,13 @@ impl Failure {
         &self.message
     }
 
-    /// The same with the messages of the errors, for the manifest and for JSON: they were printed.
+    /// The same failure with the messages of the errors, which were printed already. The manifest and JSON contain
+    /// them.
     pub(crate) fn with_causes(self, causes: Vec<String>) -> Self {
         Self { causes, ..self }
     }
 
-    /// The messages of the errors in an input, where its own message is a summary of them.
+    /// The messages of the errors in an input, if the failure's message is a summary of them.
     pub(crate) fn causes(&self) -> &[String] {
         &self.causes
     }

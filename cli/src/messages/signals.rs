@@ -25,7 +25,8 @@ struct SignalState {
     signal: Option<i32>,
 }
 
-/// How long a batch may take to find that a signal came.
+/// The time that a batch has to react to a signal. After it, the signal ends the program, unless an output file is
+/// open.
 const GRACE: Duration = Duration::from_secs(2);
 
 static STATE: Mutex<SignalState> = Mutex::new(SignalState {
@@ -42,7 +43,7 @@ fn code(signal: i32) -> u8 {
     128 + signal as u8
 }
 
-/// Ends the program, or leaves a mark for the writer of a file and for the batch.
+/// Ends the program. If a file is being written or a batch runs, records the signal instead, and they stop.
 fn handle_signal(signal: i32) {
     // Print without holding the lock: printing may have to wait for a reader, and the main thread needs the lock.
     if stopped().is_none() {

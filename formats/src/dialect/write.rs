@@ -93,7 +93,7 @@ pub fn written_joints(tree: &Tree, bodies: &[usize]) -> Vec<usize> {
     joints_of(tree, bodies)
 }
 
-/// For motions that no dialect can hold.
+/// The remedy in messages about motions that no dialect can hold.
 const OTHER_FILES: &str =
     "leave out --dialect (in Python `dialect`) and write NPZ, CSV or Parquet, which can store it";
 

@@ -304,8 +304,8 @@ pub(super) fn was_rounded(time: f64, exact: f64) -> bool {
 }
 
 impl ChannelTimes {
-    /// Adds the times of a curve, which is repeated as often as its repetitions are within a span. Returns how many of
-    /// its keys are outside the span.
+    /// Adds the times of a curve and of its repetitions within a span. Returns how many of its keys are outside the
+    /// span.
     fn add(
         &mut self,
         curve: &AnimCurve,

@@ -64,7 +64,7 @@ pub(super) fn prune(before: &Json<'_>, text: String, length: usize) -> PrunedTex
     pruned.ok().flatten().unwrap_or((text, Cut::default()))
 }
 
-/// See [`prune`]; for a text whose animations are other ones than before.
+/// As [`prune`], for a text in which other animations replace those of the original file.
 pub(super) fn prune_replaced(before: &Json<'_>, text: String, length: usize) -> PrunedText {
     let pruned = without_unused(before, &text, length, |_| Ok(Vec::new()));
     pruned.ok().flatten().unwrap_or((text, Cut::default()))

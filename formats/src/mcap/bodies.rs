@@ -207,7 +207,7 @@ fn resolve_static(body: &mut Body<'_>, start: Option<i64>, clock: &StampClock) {
     body.poses = kept;
 }
 
-/// Warns if some bodies have times of the log's clock, and others times of another one.
+/// Warns if some bodies have times of the log's clock, and others have times of another clock.
 fn warn_of_clocks(bodies: &[Body<'_>], warnings: &mut Warnings) {
     let moving = bodies
         .iter()

@@ -213,7 +213,7 @@ pub(crate) fn track_times(clip: &Motion, track: usize) -> Option<&[f64]> {
     Some(longest)
 }
 
-/// The key of a sample, or the last one.
+/// The key at the index `sample`, or the last key if there are fewer.
 pub(crate) fn at<T: Copy>(keys: &[T], sample: usize) -> Option<T> {
     keys.get(sample).or(keys.last()).copied()
 }

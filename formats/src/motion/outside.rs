@@ -101,10 +101,10 @@ pub struct KeptSamples {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum OutsideError {
-    /// The samples are none of the clip's.
+    /// The sample times are invalid for the clip.
     #[error(transparent)]
     Samples(#[from] SampleTimesError),
-    /// All lie outside the keys. The numbers are seconds.
+    /// All sample times are outside the keys. The numbers are seconds.
     #[error(
         "none of the times lies between its keys: asked for {} to {} s, keys lie from {} to {} s",
         asked[0], asked[1], keys[0], keys[1]

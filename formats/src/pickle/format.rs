@@ -119,7 +119,7 @@ fn loaded(contents: Contents, options: &ReadOptions) -> Result<Loaded, Diagnosti
     Ok(loaded)
 }
 
-/// The clips that are the dicts of a dict; `None` if none of them is one.
+/// The clips of a dict whose values are dicts with one clip each; `None` if none of these dicts is a clip.
 fn clips_of_dicts(
     mut archive: Archive,
     dicts: &[(String, usize)],

@@ -58,7 +58,7 @@ names! {
 }
 
 impl Role {
-    /// Whether a human skeleton has it in any case.
+    /// Whether every human skeleton has this part.
     #[must_use]
     pub fn is_required(self) -> bool {
         !matches!(
@@ -73,7 +73,7 @@ impl Role {
         )
     }
 
-    /// The role above it; those that are not required may be missing between them.
+    /// The role of the next part towards the hips. In a skeleton, parts that are not required may be missing.
     fn above(self) -> Option<Self> {
         Some(match self {
             Self::Hips => return None,

@@ -24,7 +24,7 @@ use crate::warnings::{Warnings, listed};
 /// The largest distance of a body from where its joints put it, in metres.
 const FITS: f64 = 1e-3;
 
-/// An order of bodies, and of bodies with the same parent.
+/// An order of bodies, with the order of bodies that have the same parent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct ListedOrder(BodyOrder, Siblings);
 
@@ -34,7 +34,7 @@ struct Candidate {
     listed: Option<ListedOrder>,
     /// The joint of each scalar, as [`Tree::scalar_joints`] counts them.
     joints: Vec<usize>,
-    /// The body of each of the file's.
+    /// For each body of the file, the body of the robot.
     bodies: Vec<Option<usize>>,
     quaternions: ComponentOrder,
 }
@@ -661,7 +661,7 @@ fn merged_bodies(robot: &Robot, recorded: Option<&RecordedBodies>) -> Option<(Tr
     Some((merged.tree, kept))
 }
 
-/// The body of each body of the file: by its name, or else in an order.
+/// For each body of the file, its index in the tree: by its name, or else in the order `order`.
 fn bodies_of(
     tree: &Tree,
     recorded: Option<&RecordedBodies>,

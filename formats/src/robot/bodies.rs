@@ -192,7 +192,7 @@ pub fn unwrap_joint(tree: &Tree, joint: &str, values: &mut [f64]) {
     let is_endless = tree.scalar_joints().any(|known| {
         known.name == joint && known.kind == JointKind::Hinge && known.limits.is_none()
     });
-    /// More than the rounding of a turn to f32.
+    /// This exceeds the rounding of a full turn to f32.
     const ROUNDING: f64 = 1e-5;
     let [low, high] = [f64::min, f64::max].map(|pick| values.iter().copied().reduce(pick));
     let may_be_wrapped = (low.zip(high)).is_some_and(|(low, high)| high - low <= TAU + ROUNDING);
@@ -354,8 +354,8 @@ pub fn motions(
     Ok(all)
 }
 
-/// The points of bodies whose velocities are asked for: centres of mass, in the order of [`Tree::bodies`], or none for
-/// origins.
+/// The points of bodies whose velocities are computed: centres of mass in the order of [`Tree::bodies`]; empty for the
+/// origins of bodies.
 ///
 /// # Errors
 /// When the file does not say where a body's centre of mass is.

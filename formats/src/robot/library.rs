@@ -22,7 +22,7 @@ pub struct RobotTracks<'a> {
     scalars: ScalarTracks,
 }
 
-/// Why a clip is none of a robot's library.
+/// Why a clip cannot be part of a robot's library.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RobotClipError {
@@ -33,7 +33,7 @@ pub enum RobotClipError {
     LargeAngle {
         /// The joint.
         joint: String,
-        /// The angle that its body turns by.
+        /// The angle by which its body is rotated.
         angle: f64,
     },
     /// The keys are none of a set.

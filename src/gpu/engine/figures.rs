@@ -98,8 +98,8 @@ impl VulkanEngine {
 /// Rates at which a device writes its memory in bytes per second: medians of several runs, by the device's clock.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct WriteRates {
-    /// The rate of the kernel that the engine uses on the device, for one constant. On cards, neighbouring
-    /// invocations store neighbouring rotations.
+    /// The rate of the kernel that the engine uses on the device, which here evaluates one constant. On cards,
+    /// neighbouring invocations store neighbouring rotations.
     pub store: f64,
     /// The rate of `vkCmdFillBuffer`.
     pub fill: f64,

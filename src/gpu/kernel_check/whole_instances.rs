@@ -21,8 +21,8 @@ use super::crowd::{
 use super::random::Random;
 use super::{Trial, bytes};
 
-/// Instances of the window, and of a workgroup. The latter are a power of two, and enough that an invocation has
-/// several joints and several time bases.
+/// The number of instances of the window, and of a workgroup. The number for a workgroup is a power of two, and so
+/// large that an invocation has several joints and several time bases.
 const INSTANCES: u32 = 38;
 const OF_WORKGROUP: u32 = 16;
 const CLOCK: u64 = 0x00ab_cdef_0123_4567;

@@ -25,7 +25,7 @@ use crate::work::lists::{
     parts_in, spread_list,
 };
 
-/// The tracks from which on a list is repeated rather than written for each.
+/// The number of tracks from which on a list is repeated instead of being written for each track.
 const LEAST_TRACKS: u32 = 64;
 
 /// The same frame by frame: as many as store a line of rotations together.
@@ -417,7 +417,8 @@ mod tests {
     /// The source of a sample: a constant; or a segment, the distance from its middle, scale and offset.
     type Source = (bool, u32, i32, [u32; 2]);
 
-    /// The source of every sample, and whether it needs care. The samples of a track are so far from each other.
+    /// The source of every sample, and whether it needs care. Neighbouring samples of a track are `stride` values
+    /// apart.
     fn sources(
         runs: impl Iterator<Item = SpreadRun>,
         samples: usize,

@@ -83,8 +83,8 @@ impl RunCounts {
 pub(crate) enum LaneAxis {
     /// Samples of a track: each lane evaluates some samples of a run.
     Samples,
-    /// Tracks with the same runs, frame by frame: each lane evaluates a whole run of its track. Its samples are so far
-    /// from each other in the result.
+    /// Tracks with the same runs, frame by frame: each lane evaluates a whole run of its track. Neighbouring samples of
+    /// a track are `stride` values from each other in the result.
     Tracks { stride: u32 },
 }
 
@@ -129,7 +129,8 @@ impl SpreadLanes {
         }
     }
 
-    /// Lanes with neighbouring tracks, whose samples are so far from each other.
+    /// Lanes with neighbouring tracks. Neighbouring samples of a track are `stride` values from each other in the
+    /// result.
     #[cfg(feature = "prove")]
     pub(crate) fn with_tracks(log2: u32, stride: u32) -> Self {
         Self {
@@ -339,7 +340,7 @@ impl SpreadLanes {
         }
     }
 
-    /// The workgroups of a dispatch over entries that are repeated so often.
+    /// The workgroups of a dispatch over entries with this number of repetitions.
     pub(crate) fn workgroups(self, entries: u32, repetitions: u32) -> [u32; 3] {
         let of_layer = (entries << self.log2).div_ceil(self.workgroup);
         [of_layer, 1, repetitions.div_ceil(self.layer_repetitions())]

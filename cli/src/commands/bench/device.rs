@@ -50,8 +50,8 @@ impl BenchDevice {
         Ok(Self { engine, report })
     }
 
-    /// Whether results come back through memory that is fresh each time, unless the caller brings memory that
-    /// is used again.
+    /// Whether the device copies results to the host. If the caller does not pass memory that is used again, this is
+    /// new memory each time.
     pub(crate) fn copies_results(&self) -> bool {
         let info = self.engine.device_info();
         info.is_some_and(|info| !matches!(info.kind, DeviceKind::Integrated | DeviceKind::Cpu))

@@ -136,7 +136,7 @@ fn step(text: &str) -> Result<Step, String> {
     text.parse::<Step>().map_err(|error| error.to_string())
 }
 
-/// A motion that cannot be compared is the input's fault.
+/// The failure of a command whose inputs cannot be compared; it counts as an error of the inputs.
 fn refused(error: CompareError) -> Failure {
     let message = error.to_string();
     match error {
@@ -290,7 +290,7 @@ impl Arguments {
         })
     }
 
-    /// Refuses options for the joints of motions where none are compared.
+    /// Refuses options for the joints of motions if no joints are compared.
     fn check_table(&self, paths: [&Path; 2]) -> Result<(), Failure> {
         let compared = match self.is_of_trajectories() {
             true => "trajectories",
@@ -423,7 +423,7 @@ impl Arguments {
         )))
     }
 
-    /// Refuses options for joints, and bounds of other quantities, where only scalars are compared.
+    /// Refuses options for joints and bounds of other quantities if only scalars are compared.
     fn check_effects(&self, report: &ComparisonReport) -> Result<(), Failure> {
         let ComparisonReport::Clips(all) = report else {
             return Ok(());
@@ -496,7 +496,8 @@ impl Arguments {
         Ok(true)
     }
 
-    /// Every clip of one file with its like of the other; and the failure of those that were refused.
+    /// The differences of each clip of one file from its partner in the other file; and the failure of the clips that
+    /// were refused.
     fn clips(
         &self,
         paths: [&Path; 2],
@@ -583,7 +584,7 @@ impl Arguments {
         Ok(selected)
     }
 
-    /// The differences of two clips at the frames that are asked for.
+    /// The differences of two clips at the requested frames.
     fn differences(&self, engine: &Engine, pair: ClipPair<'_>) -> Result<ClipDifference, Failure> {
         let common = pair.common_times().map_err(refused)?;
         for warning in common.warning.iter().chain(&pair.assumptions()) {
@@ -603,7 +604,7 @@ impl Arguments {
         found.map_err(refused)
     }
 
-    /// Fails where a difference is over its bound.
+    /// Returns an error if a difference is over its bound.
     fn judge(&self, report: &ComparisonReport) -> Result<(), Failure> {
         let faults = self.faults(report);
         let texts: Vec<String> = faults.into_iter().map(|(_, text)| text).collect();

@@ -40,14 +40,14 @@ use crate::messages::drawn::check_has_tracks;
 use crate::messages::exit::{ALL_INPUTS, Failure};
 use crate::messages::words;
 
-/// How the rotations of a clip are evaluated for their output.
+/// Whether the rotations of a clip are evaluated at once into memory, or in chunks that are written one after another.
 #[derive(Debug, Clone, Copy)]
 enum Delivery {
     InMemory,
     InChunks,
 }
 
-/// The report of one result with `--json`.
+/// The report of one result for `--json`.
 #[derive(Debug, Clone, Serialize)]
 pub(crate) struct EvaluationReport {
     format: &'static str,
@@ -81,7 +81,7 @@ impl EvaluationReport {
     }
 }
 
-/// Evaluates all that a pipeline has; gives the number of rotations in the results that are kept.
+/// Evaluates all inputs of a pipeline; returns the number of rotations in the results that are kept.
 pub(super) fn evaluate_all(
     arguments: &Arguments,
     samples: &SampleChoice,
@@ -115,7 +115,8 @@ struct EvaluationJob<'a> {
     work: &'a ClipWork,
     /// Times in gaps of the clips that are being evaluated.
     in_gaps: usize,
-    /// The seconds after the last frame that are left out, of one of these clips, unless this was asked for.
+    /// The seconds after the last frame of one of these clips that are left out; `None` if the command line asks for
+    /// this.
     left_out: Option<f64>,
 }
 
@@ -190,7 +191,7 @@ impl EvaluationJob<'_> {
         self.rotations(name, &selected, end_frame, target)
     }
 
-    /// Warns where the evaluated curves are less smooth than their method promises.
+    /// Warns if the evaluated curves are less smooth than their method promises.
     fn note_curves(&self, name: &str, clip: &Motion) -> Result<(), Failure> {
         let curve = self.curve();
         let Some(method) = curve.method.0 else {

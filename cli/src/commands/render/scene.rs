@@ -107,7 +107,7 @@ pub(crate) struct Surroundings {
     pub(crate) length: f32,
     /// How far bodies extend beyond the positions in `reach`.
     pub(crate) margin: f32,
-    /// Whether bodies throw shadows on the floor.
+    /// Whether bodies cast shadows on the floor.
     pub(crate) shadows: bool,
 }
 
@@ -128,7 +128,7 @@ pub(crate) struct Scene {
     camera: Camera,
     /// The height of the floor that shadows fall on.
     shadowed: Option<f32>,
-    /// Ground and floor, and everything that never moves; every frame begins with them.
+    /// The picture of the ground, the floor and everything that never moves, with which every frame begins.
     colour: Buffer2d<Colour>,
     depth: Buffer2d<f32>,
     labels: overlay::Labels,

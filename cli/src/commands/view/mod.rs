@@ -40,7 +40,7 @@ use tumble_formats::sample::MethodChoice;
 
 /// Bytes of rotations, speeds and positions that a page may hold, before they are packed.
 const MAX_PAGE_BYTES: f64 = 256e6;
-/// Up to this size, every method is shown where none is named.
+/// If no method is named, the page shows all methods as long as it is not larger than this.
 const SMALL_PAGE_BYTES: f64 = 24e6;
 
 /// Write an HTML file that shows boxes, skeletons or bodies on paths in 3D
@@ -258,7 +258,7 @@ impl Arguments {
         Ok(tracks.select_with_ancestors(&clip, &name)?.into_owned())
     }
 
-    /// The page of clips that are read already, of a file of that name.
+    /// The page of clips that were read before from a file of this name.
     pub(crate) fn html(
         &self,
         path: &Path,
@@ -294,8 +294,7 @@ impl Arguments {
         Destination::new(out, self.overwrite, inputs)
     }
 
-    /// The methods of each clip: those asked for; else all, or the common ones where all would make
-    /// a large page.
+    /// The methods of each clip: the requested ones; otherwise all, or the common ones if all would make a large page.
     fn methods(&self, shown: &[ShownClip]) -> Result<Vec<Vec<ResultChoice>>, Failure> {
         if shown.is_empty() {
             return Err(Failure::usage("there is nothing to show: nothing moves"));
@@ -439,7 +438,7 @@ fn bytes(shown: &[ShownClip], methods: &[Vec<ResultChoice>]) -> f64 {
         .sum()
 }
 
-/// `authored and 15 methods`: `authored` stands for the methods of the file, and is none itself.
+/// `authored and 15 methods`: `authored` is not counted as a method, because it stands for the methods of the file.
 fn counted_choices(methods: &[Vec<ResultChoice>]) -> String {
     let choices = each_once(methods.iter().flatten());
     let is_authored = |choice: &ResultChoice| *choice == ResultChoice::By(MethodChoice::AUTHORED);

@@ -20,7 +20,7 @@ use crate::messages::exit::Failure;
 /// Components of a quaternion in the order of dimensions.
 pub(crate) const NAMES: [&str; 4] = ["w", "x", "y", "z"];
 
-/// Errors below this are none: the sample is exact.
+/// Smaller errors are drawn as none: the sample is exact.
 const EXACT: f64 = 1e-12;
 
 /// The subject of a figure. Boxes and dimensions count from 0 here.
@@ -273,7 +273,8 @@ impl PlotSource<'_> {
         Ok(self.panel(title, label, range, curves, vec![dots]))
     }
 
-    /// Where curves may lie on each other, those drawn first are broader.
+    /// The width of the `order`th curve. Curves that are drawn earlier are wider, so that they are visible where curves
+    /// cover each other.
     fn width(&self, order: usize) -> f64 {
         let above = self.choices.len() - 1 - order;
         1.6 + 1.8 * above.min(3) as f64
