@@ -158,8 +158,9 @@ impl Motion {
         }
     }
 
-    /// The assumption by which some joints are matched with those of other clips, for a warning: several joints of one
-    /// parent have one name in the file, so that only their order tells them apart. `None` if nothing is assumed.
+    /// A text for a warning if several joints of one parent have the same name in the file, so that only their order
+    /// distinguishes them. It says that their order is assumed to be the same in other clips. `None` if there are no
+    /// such joints.
     #[must_use]
     pub fn order_assumption(&self, input: &str) -> Option<String> {
         let tracks = 0..self.set.track_count();

@@ -100,8 +100,8 @@ pub(crate) fn of(written: &RateSource<'_>) -> Option<FrameGrid> {
     }
 }
 
-/// The rate whose frame time, added up in f32 from the first time on, gives exactly these times: some exporters do so,
-/// and after some seconds the sums are further from the frames than rounding explains.
+/// The rate whose frame time, added up in f32 from the first time on, gives exactly these times. Some exporters compute
+/// times in this way; after some seconds the sums are further from the frames than rounding explains.
 pub(crate) fn of_sums(lists: &[Vec<f64>]) -> Option<FrameRate> {
     let mut times: Vec<f64> = lists.iter().flatten().copied().collect();
     times.sort_by(f64::total_cmp);

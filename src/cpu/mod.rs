@@ -1,9 +1,8 @@
 //! The CPU: the shaders' arithmetic in vector lanes, on all threads, with the bits of every Vulkan device.
 //!
-//! Evaluating a sample takes a few nanoseconds, less than loading its segment from memory or storing the sample
-//! there. Therefore a thread prepares about a thousand keys, evaluates them while their segments are in its cache,
-//! and drops them; long results bypass the caches; and the samples of a run, which share a segment, fill the lanes of
-//! a vector.
+//! Evaluating a sample takes a few nanoseconds, less than loading its segment from memory or storing the sample there.
+//! Therefore a thread prepares about a thousand keys, evaluates them while their segments are in its cache, and drops
+//! them. Long results bypass the caches. The samples of a run, which share a segment, fill the lanes of a vector.
 //!
 //! # Types
 //!

@@ -25,8 +25,8 @@ use crate::tracks::joints::Joints;
 use crate::tracks::set::TrackSet;
 use crate::twin::crowd_matrices::Rows;
 
-/// The default number of ticks in a second: a frame of 24, 25, 30, 48, 50, 60, 90, 100, 120, 144, 240 or 360 Hz and a
-/// sample of 44.1 kHz last a whole number of ticks.
+/// The default number of ticks in a second. With it, a frame of 24, 25, 30, 48, 50, 60, 90, 100, 120, 144, 240 or 360
+/// Hz lasts a whole number of ticks, and so does a sample of 44.1 kHz.
 const TICKS_PER_SECOND: u32 = 705_600;
 
 /// The clips, masks and inverse bind matrices of one skeleton, prepared for crowds.

@@ -21,8 +21,8 @@
 //! # Steps
 //!
 //! 1. [`Crowd::set`] packs a layer into its entry and marks the entry as changed.
-//! 2. An evaluation computes, for each layer of each instance, its tick, and from the tick its position among the key
-//!    times of the clip (a *time base* is a list of key times that channels share).
+//! 2. For each layer of each instance, an evaluation computes the tick of the clip, and from it the position among the
+//!    key times of each *time base*: a list of key times that channels share.
 //! 3. It evaluates the rotation, translation and scale of each joint in the lowest layer and blends the other layers
 //!    over it.
 //! 4. For matrices in the model it multiplies along the skeleton, level by level, and for skinning matrices also by

@@ -168,8 +168,8 @@ pub struct CrowdTarget {
     evaluation: Evaluation,
     /// The recording of a frame, which the next frame fills again.
     work: Mutex<Recorded>,
-    // The descriptor sets refer to these buffers. The caller guarantees that no work that uses them is in flight when the
-    // target is dropped.
+    // The descriptor sets refer to these buffers. The caller guarantees that no work that uses them is in flight when
+    // the target is dropped.
     _buffers: Vec<Buffer>,
 }
 

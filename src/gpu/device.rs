@@ -349,8 +349,8 @@ impl Drop for LogicalDevice {
     }
 }
 
-/// The lock of every queue that an engine of this process uses, by the queue's handle: several engines may be made of
-/// one application's device, and each of them makes a [`DeviceQueue`] for the same queue.
+/// The lock of every queue that an engine of this process uses, by the queue's handle. All engines share it, because
+/// several engines may be made of one application's device, each with a [`DeviceQueue`] for the same queue.
 static LOCKS: Mutex<BTreeMap<u64, Weak<Mutex<()>>>> = Mutex::new(BTreeMap::new());
 
 /// A queue as one engine uses it.

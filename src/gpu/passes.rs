@@ -56,8 +56,8 @@ pub struct PassTarget {
     /// Whether weights must be between 0 and 1.
     are_fractions: bool,
     bytes: u64,
-    // The descriptor sets refer to these buffers. The caller guarantees that no work that uses them is in flight when the
-    // target is dropped.
+    // The descriptor sets refer to these buffers. The caller guarantees that no work that uses them is in flight when
+    // the target is dropped.
     _buffers: Vec<Buffer>,
 }
 
@@ -295,10 +295,10 @@ impl PassTarget {
     /// Records the pass into the application's command buffer.
     ///
     /// Recording neither waits nor allocates. It records the weights, whose values stay in the commands, and one
-    /// dispatch; for poses that are added frame by frame one dispatch for each 65 536 values; and before a blend a
-    /// copy of each layer, unless the layers are contiguous. Barriers are included, as for the samples of a clip
-    /// ([`ClipTarget::record`](crate::gpu::clip::ClipTarget::record)): the pass waits for all commands
-    /// recorded before it, and later commands see the result. The commands may be submitted any number of times.
+    /// dispatch. For poses that are added frame by frame it records one dispatch for each 65 536 values. Before a blend
+    /// it records a copy of each layer, unless the layers are contiguous. Barriers are included, as for the samples of
+    /// a clip ([`ClipTarget::record`](crate::gpu::clip::ClipTarget::record)): the pass waits for all commands recorded
+    /// before it, and later commands see the result. The commands may be submitted any number of times.
     ///
     /// # Safety
     /// The command buffer must belong to the engine's device and to a queue family that can compute, and must be in

@@ -97,9 +97,10 @@ pub enum PrepareArcs {
     OnDevice,
 }
 
-/// Where an engine keeps, from process to process, data that takes time to make: the driver's compiled kernels
-/// (`pipelines-…`), the kernels that passed their check (`kernel-checks`), and the speed of each model of card
-/// (`probe-…`, for [`Engine::auto`](crate::engine::Engine::auto)). An engine reads and writes no other files.
+/// The folder in which an engine keeps files for later processes, because their data takes time to make. They contain
+/// the driver's compiled kernels (`pipelines-…`), the kernels that passed their check (`kernel-checks`), and the speed
+/// of each model of card (`probe-…`, for [`Engine::auto`](crate::engine::Engine::auto)). An engine reads and writes no
+/// other files.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 #[non_exhaustive]
 pub enum CacheFiles {

@@ -307,10 +307,10 @@ impl ClipData {
         }
     }
 
-    /// For each track a number that consecutive tracks share if their intervals have the same times; [`NONE`] for
-    /// tracks that are not [regular](Prepared::is_regular), or whose arcs are not those between their keys as they are
-    /// stored, and where fewer than [`ALIKE`] tracks in succession have the same times. Found once, when they are asked
-    /// for.
+    /// For each track a number, which consecutive tracks share if their intervals have the same times. It is [`NONE`]
+    /// if the track is not [regular](Prepared::is_regular), if its arcs are not those between its stored keys, or if
+    /// fewer than [`ALIKE`] consecutive tracks have these times. The numbers are found once, when they are first
+    /// needed.
     pub(crate) fn time_classes(&self) -> &[u32] {
         self.time_classes.get_or_init(|| {
             let (mut last, mut class): (&[f64], u32) = (&[], 0);

@@ -10,8 +10,8 @@ use crate::twin::Evaluate as _;
 use crate::twin::evaluate_polynomial::Polynomial;
 
 /// The rows of some packed segments, one segment after the other. It is an unsized type around a slice, not a struct
-/// that refers to a slice: if a function takes a reference to it, the compiler knows that stores to the output change
-/// no coefficient, and keeps the coefficients in registers.
+/// that refers to a slice. If a function takes a reference to such a type, the compiler knows that stores to the output
+/// change no coefficient, and keeps the coefficients in registers.
 #[derive(TransparentWrapper)]
 #[repr(transparent)]
 pub(crate) struct PackedSegments([[f32; 4]]);

@@ -70,8 +70,8 @@ impl Prepared {
         }
     }
 
-    /// Reserves memory for this number of keys, so that the lists are not copied as they grow, and do not use twice
-    /// the memory; lists that are reused do not grow to twice their length for a few keys more.
+    /// Reserves memory for this number of keys. Otherwise the lists would be copied as they grow, and could take twice
+    /// the memory. Lists that are used again grow only by the missing keys, not to twice their length.
     pub(crate) fn reserve(&mut self, keys: usize) -> Result<(), OutOfMemoryError> {
         let bytes = segment_size(self.segments.form) + size_of::<[f32; 4]>();
         let too_many = || OutOfMemoryError::new::<u8>(SEGMENTS, keys.saturating_mul(bytes));

@@ -375,10 +375,10 @@ impl SmoothPreparation {
         uses_ends && self.interpolation.ends == Ends::Frozen
     }
 
-    /// Adds the values at a track's ends, if a stretch reaches them, and outside: the curves that extrapolate the
-    /// track with the angular velocity of its ends, if the wrap mode requests it; and, if the curve does not pass
-    /// through its keys, the constants that are held there: its end values for rotations, 0 for velocities and
-    /// accelerations.
+    /// Adds the values at a track's ends and outside them, if a stretch reaches these ends. If the wrap mode requests
+    /// it, these are curves that extrapolate the track with the angular velocity of its ends. If the curve does not
+    /// pass through its keys, they are constants that are held there: the curve's end values for rotations, 0 for
+    /// velocities and accelerations.
     fn add_ends(&self, prepared: &mut Prepared, stretch: &TrackStretch) {
         let Interpolation { before, after, .. } = self.interpolation;
         let of_rotations = self.interpolation.quantity == Quantity::Rotation;

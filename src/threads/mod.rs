@@ -1,9 +1,9 @@
 //! The engine's threads. The engine does not use rayon's global pool, because that pool does not work in a forked
 //! process, and ends the program if the system refuses threads.
 //!
-//! Every thread that waits for work of the engine sleeps. A worker of a caller's rayon pool would otherwise, as
-//! rayon's workers do, run other tasks of that pool while it waits, and such a task could need a lock that the
-//! waiting call or its caller has.
+//! Every thread that waits for work of the engine sleeps. Otherwise a worker of a caller's rayon pool would run other
+//! tasks of that pool while it waits, as rayon's workers do. Such a task could need a lock that the waiting call or its
+//! caller has.
 
 // Without the feature `vulkan`, nothing uses `exclusive`.
 #[cfg_attr(not(feature = "vulkan"), allow(dead_code))]

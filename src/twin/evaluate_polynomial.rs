@@ -39,7 +39,8 @@ macro_rules! run_of_polynomial {
     };
 }
 
-/// The coefficients of these powers in all lanes. Written out without a closure, because closures are not always inlined.
+/// The coefficients of these powers in all lanes. Written out without a closure, because closures are not always
+/// inlined.
 macro_rules! repeated {
     ($rows:expr, $($power:literal)+) => {
         [$(L::repeated($rows[$power])),+]

@@ -1,5 +1,5 @@
-//! The recording of the states of a motion library's clips: joints in their parents' frames, the walk along the
-//! skeleton or along the tree of a robot, differences if velocities are computed as differences, and a copy of each
+//! The recording of the states of a motion library's clips. Its steps are: joints in their parents' frames; the walk
+//! along the skeleton or along the tree of a robot; differences, if velocities are differences; a copy of each
 //! requested array.
 
 use std::ops::Range;

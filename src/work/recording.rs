@@ -3,7 +3,7 @@
 //! [`Recorded`](crate::gpu::recorded::Recorded) knows the memory of each resource, and writes the steps into a command
 //! buffer. A recording that is filled again needs no new memory for as many steps as before.
 //!
-//! Barriers follow from how kernels use their bindings ([`Access`], which the compiler of the shaders lists): a step
+//! Barriers follow from how kernels use their bindings ([`Access`], which the compiler of the shaders lists). A step
 //! waits for the earlier steps that wrote what it reads, or that used what it writes, unless a barrier has ordered them
 //! already. Two rules make this exact without knowing addresses: resources do not overlap, except those that are only
 //! read; and kernels that only write a resource, and copies into it, write different parts of it.

@@ -81,9 +81,9 @@ impl InputFile {
         Some(all.map(|identity| identity.bytes).sum())
     }
 
-    /// Its hash, if it can be read twice. A file that cannot be read is reported when it is opened. That of an input
-    /// of one file is the SHA-256 of its bytes; of several files it is that of a list as `sha256sum` prints it: the
-    /// hash and the name of each, the input first.
+    /// The input's hash, if it can be read twice. A file that cannot be read is reported when it is opened. If the
+    /// input is one file, the hash is the SHA-256 of its bytes. If it is several files, it is the SHA-256 of a list as
+    /// `sha256sum` prints it: the hash and the name of each file, the input first.
     pub(crate) fn sha256(&self) -> Option<&str> {
         let hash = || {
             self.before.as_ref()?;

@@ -289,8 +289,8 @@ pub(crate) struct UnfinishedInputs<'a> {
 }
 
 impl ManifestLines {
-    /// A last line without its end was being written when the program was killed: the batch has not come to its end,
-    /// and the inputs that it had yet to evaluate have lines before it.
+    /// Parses the lines. A last line without a line end was being written when the program was killed. It is not
+    /// needed: the batch has not ended, and all inputs that it had yet to evaluate have lines before this one.
     pub(crate) fn parse(bytes: &[u8]) -> Self {
         let mut lines = Self {
             entries: BTreeMap::new(),

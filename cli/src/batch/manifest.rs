@@ -4,8 +4,8 @@
 //! A batch begins with a line for each input that it will evaluate (`pending`). By these lines, a batch that did not
 //! end is recognised. While the batch runs, a line is added for each input that failed, and for each result. The line
 //! of a result is added before the file gets its name. So a file that does not match its line must be made again. At
-//! the end the lines are sorted and the file is replaced, so that the manifest of a batch that was stopped and resumed
-//! has the same bytes as that of a batch that was not.
+//! the end the lines are sorted and the file is replaced. So the manifest has the same bytes whether or not the batch
+//! was stopped and resumed.
 //!
 //! A file is a manifest if its first line is an entry; any other file of this name is refused unless files may be
 //! replaced. Lines are added only to a file that this batch has created, because hard links to an older file must keep
@@ -449,10 +449,10 @@ impl InputPresence {
 
     /// Whether the input with this path, whose result has this name, is present. If it is not found, it counts as
     /// removed if the directory that the command line named still exists and has other files. This directory is the
-    /// input's path without the part that the name of its result repeats; for a path below the current directory, such
-    /// as `walks/a.bvh` in a list of inputs, it is the first folder. For a name without a directory the answer is
-    /// unknown, because any directory may have contained it. A directory in the place of a file is not the input,
-    /// unless `may_be_folder` is set.
+    /// input's path without the part that the name of its result repeats. For a path below the current directory, such
+    /// as `walks/a.bvh` in a list of inputs, it is the first folder of the path. For a name without a directory the
+    /// answer is unknown, because any directory may have contained it. A directory in the place of a file is not the
+    /// input, unless `may_be_folder` is set.
     fn of(input: &str, result: Option<&str>, may_be_folder: bool) -> Self {
         let path = Path::new(input);
         let is_missing = || match std::fs::symlink_metadata(path) {

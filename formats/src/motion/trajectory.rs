@@ -1,6 +1,6 @@
-//! Errors of an estimated path of one body against a reference, as benchmarks of odometry and SLAM define them: after
-//! an alignment, for each pose (absolute) or for steps of some seconds or metres (relative). The results are those of
-//! `evo`.
+//! Errors of an estimated path of one body against a reference, as benchmarks of odometry and SLAM define them. They
+//! are computed after an alignment, for each pose (absolute) or for steps of some seconds or metres (relative). The
+//! results are those of `evo`.
 
 use std::fmt;
 

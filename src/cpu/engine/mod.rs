@@ -1,5 +1,5 @@
-//! The CPU as a device: its threads and its vector width, and evaluation of sets batch by batch: a thread prepares
-//! some intervals, evaluates them while their segments are in its cache, and drops them.
+//! The CPU as a device: its threads, its vector width, and the evaluation of sets batch by batch. For each batch, a
+//! thread prepares some intervals, evaluates them while their segments are in its cache, and drops them.
 
 pub(crate) mod clip;
 pub(crate) mod from_keys;

@@ -457,7 +457,7 @@ impl Crowd {
     }
 
     /// Moves the clock forward by `seconds`, rounded to ticks. If steps are not whole numbers of ticks, the rounding
-    /// errors of many steps add up: if the clock must follow frames exactly, as in a film at 30000/1001 frames a
+    /// errors of many steps add up. If the clock must follow frames exactly, as in a film at 30000/1001 frames a
     /// second, use [`Crowd::set_clock`] with each frame's time.
     ///
     /// # Errors

@@ -86,15 +86,15 @@ impl Clip {
 
     /// The memory that the clip takes on the host for each key, in bytes; 0 for a clip without keys.
     ///
-    /// By default a clip keeps a segment for each key: 64 bytes for an arc, and 144, 176 or 208 for a polynomial. For
-    /// Catmull-Rom, Bessel-Overhauser, Hermite and B-spline curves the CPU leaves out coefficients that are 0: the
-    /// smaller the rotation between two keys, the fewer it keeps. Nearly all segments of recorded motion then take 144
-    /// bytes. Other methods mostly need all coefficients, and devices keep all. On the CPU a clip keeps its keys
-    /// instead if two conditions hold: its segments would take more memory than
-    /// [`EngineOptions::kept_segments`](crate::EngineOptions::kept_segments) or than the engine may use, and samples
-    /// can be computed from the keys (for arcs, and for cubics that mostly rotate little between keys). A key takes 16
-    /// bytes, and its time 8, once for all tracks with the same times. For the first condition a polynomial counts as
-    /// 208 bytes, because its coefficients are not known before.
+    /// By default a clip keeps a segment for each key. An arc takes 64 bytes, and a polynomial takes 144, 176 or 208
+    /// bytes. For Catmull-Rom, Bessel-Overhauser, Hermite and B-spline curves the CPU leaves out coefficients that are
+    /// 0. There are more of these if the rotation between two keys is small, so that nearly all segments of recorded
+    /// motion take 144 bytes. Other methods mostly need all coefficients, and devices keep all. On the CPU a clip keeps
+    /// its keys instead of segments if two conditions hold. First, the segments would take more memory than
+    /// [`EngineOptions::kept_segments`](crate::EngineOptions::kept_segments) or than the engine may use; here a
+    /// polynomial counts as 208 bytes, because its coefficients are not known before. Second, samples can be computed
+    /// from the keys: for arcs, and for cubics that mostly rotate little between keys. A key then takes 16 bytes. Its
+    /// time takes 8 bytes, once for all tracks with the same times.
     #[must_use]
     pub fn bytes_per_key(&self) -> f64 {
         let bytes = match &self.tracks {

@@ -63,9 +63,9 @@ pub(crate) fn check_family(
     }
 }
 
-/// The queue that can run beside one of the family `compute` and disturbs it least: a copy engine; otherwise a family
-/// with compute and without graphics; otherwise a second queue of the same family; otherwise any other family with
-/// compute or graphics. Families for video and optical flow are not used.
+/// The queue that can run at the same time as one of the family `compute` and disturbs it least. The first of these
+/// that exists is used: a copy engine; a family with compute and without graphics; a second queue of the same family;
+/// any other family with compute or graphics. Families for video and optical flow are not used.
 pub(crate) fn copy_queue(
     families: &[vk::QueueFamilyProperties],
     compute: u32,

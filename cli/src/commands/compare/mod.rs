@@ -171,9 +171,10 @@ fn partners(paths: [&Path; 2], clips: [&[Motion]; 2]) -> Result<Vec<usize>, Fail
     (0..all[0].len()).map(found_or_refused).collect()
 }
 
-/// The index, among the animations of another file, of the one that belongs to animation `index` of a file, by the
-/// names of all: the one of the same name, if it is unique on both sides; that of the same index if each file has one,
-/// or if the names are equal in the same order.
+/// The index of the animation of a second file that belongs to animation `index` of the first. `all` has the names of
+/// the animations of both files. If each file has one animation, or both have the same names in the same order, the
+/// index is the same. Otherwise it is that of the animation of the same name, if the name occurs only once in each
+/// file.
 pub(crate) fn partner(all: [&[Option<&str>]; 2], index: usize) -> Option<usize> {
     if all.iter().all(|names| names.len() == 1) || all[0] == all[1] {
         return Some(index);

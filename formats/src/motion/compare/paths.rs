@@ -280,8 +280,9 @@ struct Association {
 /// Two times this close are one, in seconds: clocks that count from different seconds are rounded differently.
 const SAME_TIME: f64 = 1e-9;
 
-/// A pose beyond the ends of the other path belongs to its end if it is not further away than this, in seconds: f64 of
-/// seconds since 1970 have steps of 0.2 µs, and formats that store times as f32 round them further.
+/// A pose beyond the ends of the other path belongs to its end if it is not further away than this, in seconds. The
+/// reason is rounding: an f64 of seconds since 1970 has steps of 0.2 µs, and formats that store times as f32 round them
+/// further.
 fn same_end(time: f64) -> f64 {
     (time.abs() * f64::from(f32::EPSILON)).clamp(5e-7, 1e-4)
 }
