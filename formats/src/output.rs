@@ -276,9 +276,9 @@ pub fn remove_abandoned_marked(directory: &Path, mark: &str) {
     });
 }
 
-/// Removes those of a directory's temporary files for which `claim` returns something, which lives until the file is
-/// removed: a writer that could lock its new file before that would lose it. `claim` gets the directory, the name and
-/// the mark in the name.
+/// Removes the temporary files of a directory for which `claim` returns a value, such as a lock. The value lives until
+/// the file is removed. Otherwise a writer could lock its new file meanwhile, and would lose it. `claim` gets the
+/// directory, the name and the mark in the name.
 fn remove_temporary<T>(directory: &Path, claim: impl Fn(&Folder, &OsStr, &str) -> Option<T>) {
     let Ok(folder) = Folder::open(directory) else {
         return;

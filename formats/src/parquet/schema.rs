@@ -47,7 +47,7 @@ pub(super) fn check_schema(metadata: &[u8]) -> Result<(), String> {
     Ok(())
 }
 
-/// How many columns follow an entry of a schema in its group; 0 if it is none.
+/// The number of columns that follow an entry of a schema as its group; 0 if the entry is not a group.
 fn columns_of(input: &mut Compact<'_>, kind: u8) -> Option<u64> {
     if kind != STRUCT {
         return None;
