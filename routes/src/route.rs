@@ -139,7 +139,7 @@ impl Route {
         }
         let normals: Option<Vec<DVec3>> = kept.iter().map(|&spot| surface.normal(spot)).collect();
         Self {
-            // A sum of nothing is -0.
+            // `sum()` of no numbers would be -0.
             length: points
                 .windows(2)
                 .map(|pair| pair[0].distance(pair[1]))

@@ -337,7 +337,7 @@ impl Samples for Staged<'_, '_> {
         let (line, end) = (staged_start / EACH, staged_start + count);
         let is_next = self.made == staged_start;
         if is_next && count > SAMPLES_ONE_BY_ONE && end / EACH < LINES {
-            // First the staged lines before these samples.
+            // The lines that were staged before these samples are stored first.
             self.destination.store::<L>(&self.lines[..line]);
             if self.destination.before.is_empty() {
                 let streaming_lines = StreamingLines {

@@ -994,7 +994,7 @@ impl Poses<'_> {
         if scratch.clip != Some(clip) {
             scratch.clip = Some(clip);
             positions.clear();
-            // As if keys were at even times.
+            // For the first guess, the keys are taken to be at even times.
             positions.extend(bases.iter().map(|base| CrowdPosition {
                 span: spans_in(base, tick.into(), clip_entry.period) as u32,
                 parameter: 0.0,

@@ -12,7 +12,7 @@
 //! buffer. Callers get the device for these by `gpu::Opened::of`.
 
 pub(crate) mod cache;
-// On the CPU, crowds are evaluated without these.
+// Only devices use these types: the CPU evaluates crowds without them.
 #[cfg_attr(not(feature = "vulkan"), allow(dead_code))]
 pub(crate) mod crowd;
 pub(crate) mod error;

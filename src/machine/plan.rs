@@ -201,7 +201,7 @@ impl Plan {
         limits: &Limits,
     ) -> Vec<Self> {
         let chunk = chunk.filter(|&chunk| chunk < whole.len());
-        // The segments of all groups exist at the same time.
+        // The bytes are added, because the segments of all groups are in memory at the same time.
         let bytes = requests.iter().map(bytes_of);
         let segment_bytes = bytes.fold(0, usize::saturating_add);
         let plan = |request: &SetRequest<'_>| {

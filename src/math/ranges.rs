@@ -230,7 +230,7 @@ impl<R: Real> PrincipalRange<R> {
 
     #[inline(always)]
     fn check(&mut self, value: R, limit: f64) {
-        // NaN sets the doubt too.
+        // If the value is NaN, the doubt is set, too.
         self.doubt = value.up_to(R::all(limit), self.doubt, R::all(1.0));
     }
 }

@@ -79,7 +79,7 @@ impl SmoothPreparation {
         let all = track.keys.len() - 1;
         let first_key = prepared.constants.len() as u32;
         let of_rotations = self.interpolation.quantity == Quantity::Rotation;
-        // A curve that does not pass through its keys has end values of its own.
+        // If a curve does not pass through its keys, its end values are not its first and its last key.
         let meets_keys = of_rotations && self.interpolation.method.interpolates || all == 0;
         let last_key = first_key + intervals.len() as u32;
         // Intervals that stand still are held at a key, so the keys are stored for them too.

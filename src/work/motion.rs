@@ -187,7 +187,7 @@ pub(crate) fn record_window(
                 };
                 dispatch(recording, set, stored);
             }
-            // Only a tree has such arrays.
+            // Never happens: only requests with a tree have such arrays.
             (StoredNumbers::Picked { .. }, None) => {}
         }
     }

@@ -126,7 +126,7 @@ impl MovedChannel {
             _ => 1,
         };
         match self.path {
-            // Each target is a scalar with times.
+            // Each morph target becomes a scalar, which has its own list of times.
             TargetPath::Weights => self.elements * (size_of::<f64>() + values * size_of::<f32>()),
             _ => size_of::<f64>() + values * size_of::<Quat>(),
         }

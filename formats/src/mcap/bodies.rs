@@ -381,7 +381,7 @@ fn keys(
         );
         return Err(body.refuse(file, row, Code::TimeNotIncreasing, message));
     }
-    // Messages may overtake each other.
+    // Messages may be in another order in the log than that of their times.
     body.poses.sort_by_key(|pose| pose.time);
     let location = |key: usize| body.location(key);
     let origin = Origin {

@@ -81,7 +81,8 @@ impl Motion {
             product.finish(index, &mut kept);
         }
         if !tracks.iter().any(|&track| parent(track).is_none()) {
-            // The body shape of SMPL determines the position of the root.
+            // The root is left out. The shape of an SMPL body concerns the position of its root, so it does not apply
+            // any more.
             kept.body = None;
         }
         Ok(kept)

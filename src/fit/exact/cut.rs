@@ -121,7 +121,7 @@ impl Cutter {
             done = some.end;
         }
         self.waiting.clear();
-        // Most subcurves are in order already.
+        // The sort is fast, because most subcurves are in order already.
         let times = |subcurve: &Subcurve| subcurve.piece.extent().0;
         self.subcurves.sort_by(|a, b| {
             let by_time = || times(a).total_cmp(&times(b));

@@ -151,7 +151,7 @@ struct SegmentInputs<S> {
 
 impl<S: Segment> SegmentInputs<S> {
     fn new(random: &mut Random, encoding: Encoding) -> Self {
-        // All other stores only accept rotations.
+        // Some stores take any vectors. All others accept only rotations, and get no other segments here.
         let takes_any = encoding.row().takes_vectors;
         let segment = |random: &mut Random| match takes_any && random.once_in(3) {
             true => S::any(random),

@@ -93,7 +93,7 @@ pub(crate) fn list(validation: bool) -> Result<Vec<PhysicalDevice>, VulkanError>
     for raw in all.named("vkEnumeratePhysicalDevices")? {
         match PhysicalDevice::new(&instance, raw) {
             Ok(device) => devices.extend(device),
-            // Other devices may still work.
+            // The search continues, because other devices may work.
             Err(error) => failed = Some(error),
         }
     }

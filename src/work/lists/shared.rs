@@ -156,7 +156,7 @@ impl SharedGroup {
             let sample = window.samples.start + run.output as usize;
             run.output = window.offset(track, sample) as u32;
         }
-        // A component of any track may be tiny.
+        // A run has the mark for tiny components if any of the tracks needs it, because all tracks share the run.
         first.runs.par_iter_mut().for_each(|run| {
             let segment = |track: u32| run.source.wrapping_add(stride.segments.wrapping_mul(track));
             if run.count & (IS_CONSTANT | NEEDS_CARE) == 0

@@ -185,7 +185,7 @@ impl EvaluationJob<'_> {
             self.warn_of_lost_channels(clips);
             return self.poses(name, clip, poses, end_frame, target);
         }
-        // Selected before the warning, so that an unknown track is the only message.
+        // Tracks are selected before the warning is printed, so that an unknown track is the only message.
         let selected = tracks.select(clip, name)?;
         self.warn_of_lost_channels(clips);
         self.rotations(name, &selected, end_frame, target)

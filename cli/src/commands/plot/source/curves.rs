@@ -128,7 +128,7 @@ impl PlotSource<'_> {
         } else {
             let of = |(index, one): (usize, &CurveChoice)| {
                 let (name, colour) = (one.method.name(), colours::of_choice(one.method));
-                // Later curves are drawn over earlier ones.
+                // Only later curves can hide a curve, because they are drawn over it.
                 let mut over = self.choices[index + 1..].iter().rev();
                 let hidden_by = over.find(|other| {
                     let other = colours::of_choice(other.method);
