@@ -453,7 +453,8 @@ mod tests {
             let clip = engine.upload(set, method).unwrap();
             let timeline = frames.resolve(set.track_count(), set.time_span()).unwrap();
             let count = timeline.len();
-            // So few samples at once are evaluated one by one, each from its segment.
+            // The expected samples are requested three at a time: so few samples are evaluated one by one, each from
+            // its segment.
             let mut expected = vec![[0.0; 4]; set.track_count() * count];
             for first in (0..count).step_by(3) {
                 let some = first..count.min(first + 3);

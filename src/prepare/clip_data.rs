@@ -230,7 +230,7 @@ impl ClipData {
         track: impl Fn(usize) -> Cow<'t, VectorTrack> + Sync,
         request: &VectorRequest<'_>,
     ) -> Result<Self, OutOfThreadsError> {
-        // As a velocity, a vector is refused where an output is for rotations only.
+        // Vectors count as velocities here, so that outputs that are for rotations only refuse them.
         let interpolation = Interpolation {
             quantity: Quantity::Velocity(Axes::Parent),
             ..*request.interpolation

@@ -440,7 +440,7 @@ impl<'a> InputHashes<'a> {
         }
         let made = counts.into_iter().filter(|((_, all), found)| found >= all);
         let files = entries.iter().flat_map(|entry| &entry.option_files);
-        // Those without a hash could be read only once, as standard input.
+        // Files without a hash are left out: they could be read only once, as standard input.
         let files = files.filter(|file| !file.sha256.is_empty());
         let paths: BTreeSet<&str> = files.map(|file| &*file.path).collect();
         let hash = |path| Some(options::content(path)).filter(|_| Path::new(path).exists());

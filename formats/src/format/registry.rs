@@ -15,7 +15,7 @@ impl Format {
         match self.name {
             // Loaders of robots' motions look for `*.pkl`.
             "pickle" => "pkl",
-            // Those of ProtoMotions look for `*.motion`.
+            // The loader of ProtoMotions looks for `*.motion`.
             "torch" => "motion",
             name => name,
         }
