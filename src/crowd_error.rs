@@ -53,7 +53,7 @@ pub enum CrowdError {
         /// The clip's length in ticks.
         ticks: u32,
     },
-    /// Events are asked for after a time that is yet to come.
+    /// Events since a time are requested, but the clock has not reached this time.
     #[error("events since {since} ticks, but the clock is at {clock}; give an earlier time")]
     EventsSince {
         /// The requested time in ticks.
@@ -219,7 +219,7 @@ pub enum CrowdError {
         /// The number of the result's values.
         needed: usize,
     },
-    /// Poses end within an instance.
+    /// The number of vectors is not a whole number of poses.
     #[error("{length} vectors are no whole number of poses, which have {each} each")]
     PartOfPose {
         /// The number of vectors of four numbers.
@@ -266,7 +266,7 @@ pub enum CrowdError {
         /// The requested encoding.
         encoding: Encoding,
     },
-    /// Clips are to lie on a device, and the engine is the CPU.
+    /// Clips cannot be copied to a device, because the engine is the CPU.
     #[error("the engine is the CPU, which has no memory of its own; open a Vulkan device")]
     OnCpu,
     /// The range of a buffer does not fit the result.

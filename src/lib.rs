@@ -76,7 +76,7 @@
 //!   f64 reference, cubic methods within 1e-6 rad.
 //! * **Exact keys**: a sample at a key's time has the key's bits (for methods that pass through their keys).
 
-// Tests may use what systems round differently (clippy.toml).
+// Tests may use functions whose last bit differs between systems (clippy.toml).
 #![cfg_attr(test, allow(clippy::disallowed_methods))]
 // The smallest build (build/main.rs) does not call code that is only faster.
 #![cfg_attr(smallest, allow(dead_code, unused_imports))]

@@ -69,8 +69,8 @@ enum TumbleResult
   TUMBLE_RESULT_INVALID_HANDLE = 2,
   /*
    An argument is invalid: an unknown constant or name, a number out of its range, an array that is too large for
-   memory, a structure whose `size` is that of no version or of a newer one, text that is not UTF-8, or objects that
-   do not belong together.
+   memory, a structure whose `size` is not that of a known version, text that is not UTF-8, or objects that do not
+   belong together.
    */
   TUMBLE_RESULT_INVALID_ARGUMENT = 3,
   /*
@@ -2145,9 +2145,9 @@ TumbleResult tumble_crowd_library_of_file(const struct TumbleFile *file,
 
  Joints that the clip does not have stay at rest. The clip must not have joints that the library does not have.
  `clip_of_file` is the index of the clip in the file, counted from 0. `interpolation` and `vectors` are as in
- `tumble_crowd_library_push`, but null stands for the methods of the file, which must be one method for all
- rotations, and one for all translations and scales. `clip` receives the clip's index in the library, counted from
- 0; it may be null.
+ `tumble_crowd_library_push`, but null stands for the methods of the file. All rotations of the file must then
+ have one method, and all translations and scales must have one. `clip` receives the clip's index in the library,
+ counted from 0; it may be null.
 
  # Errors
  - `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such clip.
@@ -2190,7 +2190,7 @@ TumbleResult tumble_crowd_new(const struct TumbleEngine *engine,
                               struct TumbleCrowd **crowd);
 
 /*
- Sets what layers of instances play from now on. `layers` is an array of `count` changes.
+ Sets the clips that layers of instances play from now on. `layers` is an array of `count` changes.
 
  A fade of a layer that is set ends. If two changes are for one layer, the later one counts. The changes, at most
  20 bytes each, reach the device with the next evaluation.
@@ -2209,7 +2209,7 @@ TumbleResult tumble_crowd_set(struct TumbleCrowd *crowd,
                               size_t count);
 
 /*
- Returns what a layer of an instance plays, with its current time. Speed and weight are the rounded ones.
+ Returns the clip that a layer of an instance plays, with its current time and its rounded speed and weight.
 
  The caller sets `layer->size`, `layer->instance` and `layer->layer`; the call writes the other members.
 
@@ -2342,8 +2342,8 @@ TumbleResult tumble_crowd_get_fade(const struct TumbleCrowd *crowd,
                                    bool *fades);
 
 /*
- Adds an event to a clip of a library: a moment such as a step or the throw of a ball, `tick` ticks after the clip's
- start, up to its length. Crowds that exist already do not have it.
+ Adds an event to a clip of a library: a moment such as a step or the throw of a ball, `tick` ticks after the
+ clip's start, up to its length. Crowds that were made before do not have the event.
 
  `name` may be null: then the event has none. Several events may have one name. `event` receives the event's index; it
  may be null.
@@ -2605,10 +2605,10 @@ TumbleResult tumble_crowd_target_new(const struct TumbleCrowd *crowd,
  `stage` is a `TumbleCrowdStage`. A frame is then, for example: `tumble_crowd_record` with a target for
  `TUMBLE_CROWD_VALUES_LOCAL` in this range, the application's own commands that change these matrices (inverse
  kinematics), and `tumble_crowd_record` with the stage's target, which makes them skinning matrices. The stage
- continues the matrices of as many instances as are visible when it is recorded, whatever wrote them. Results have the
- bits of the CPU, if all numbers are finite and less than 2^36 in magnitude; where nothing was changed, they have the
- bits of an evaluation without stages. The buffer, its range and the errors are as for `tumble_crowd_target_new` with
- matrices in 32 bits.
+ continues the matrices of as many instances as are visible when it is recorded. Anything may have written these
+ matrices. Results have the bits of the CPU, if all numbers are finite and less than 2^36 in magnitude; where
+ nothing was changed, they have the bits of an evaluation without stages. The buffer, its range and the errors
+ are as for `tumble_crowd_target_new` with matrices in 32 bits.
 
  # Safety
  As for `tumble_crowd_target_new`.

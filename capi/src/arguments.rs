@@ -48,7 +48,8 @@ pub(crate) unsafe fn list<'a, T: Copy>(
         return Ok(&[]);
     }
     check(pointer, name)?;
-    // SAFETY: not null, aligned, of a size that can be; the rest is the caller's promise.
+    // SAFETY: the pointer is not null and aligned, and the size does not overflow. The caller promises the rest: the
+    // memory has `count` values, which do not change during the call.
     Ok(unsafe { std::slice::from_raw_parts(pointer, count) })
 }
 
@@ -74,7 +75,7 @@ pub(crate) unsafe fn list_mut<'a, T: Number>(
         return Ok(&mut []);
     }
     check(pointer, name)?;
-    // SAFETY: as in `list`; every pattern of bits is a number.
+    // SAFETY: as in `list`; the memory may have any content, because every bit pattern is a valid `T`.
     Ok(unsafe { std::slice::from_raw_parts_mut(pointer, count) })
 }
 
@@ -154,7 +155,7 @@ pub(crate) unsafe fn needed<T: SizedStructure>(
     pointer: *const T,
     name: &str,
 ) -> Result<T, Failure> {
-    // SAFETY: the caller's promise.
+    // SAFETY: as the caller promises.
     let found = unsafe { sized(pointer, name)? };
     found.ok_or_else(|| {
         let message = format!("`{name}` is null");
@@ -206,7 +207,7 @@ pub(crate) unsafe fn text<'a>(
     if pointer.is_null() {
         return Ok(None);
     }
-    // SAFETY: the caller's promise.
+    // SAFETY: as the caller promises.
     let text = unsafe { CStr::from_ptr(pointer) };
     let text = text.to_str();
     text.map(Some)
@@ -243,8 +244,8 @@ impl<T> Out<T> {
         if self.pointer.is_null() {
             return;
         }
-        // SAFETY: not null and aligned; the rest is the caller's promise. Nothing is dropped that
-        // was there before: it may never have been written.
+        // SAFETY: not null and aligned; the caller promises the rest. The previous value is not dropped, because the
+        // memory may not be initialised.
         unsafe { self.pointer.write(value) };
     }
 }

@@ -57,7 +57,7 @@ pub struct TumbleEngineOptions {
     pub cache_directory: *const c_char,
 }
 
-// SAFETY: `repr(C)`, the size is first, and zeros are numbers and null pointers.
+// SAFETY: `repr(C)`, the size is the first member, and zero bits are valid numbers and null pointers.
 unsafe impl SizedStructure for TumbleEngineOptions {
     const FIRST_SIZE: usize = offset_of!(Self, cache_directory);
 }

@@ -121,7 +121,7 @@ pub struct TumbleInterpolation {
     pub bias: f64,
 }
 
-// SAFETY: `repr(C)`, the size is first, and zeros are numbers and null pointers.
+// SAFETY: `repr(C)`, the size is the first member, and zero bits are valid numbers and null pointers.
 unsafe impl SizedStructure for TumbleInterpolation {
     const FIRST_SIZE: usize = size_of::<Self>();
 }

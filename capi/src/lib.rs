@@ -4,9 +4,9 @@
 //! type is an error (module `handle`). Every function that can fail returns a [`TumbleResult`](result::TumbleResult),
 //! and [`result::tumble_last_error`] returns its message. A panic, which is an error of this library, does not reach
 //! the caller: the call returns the code `INTERNAL`.
-// Tests may use what systems round differently (clippy.toml).
+// Tests may use functions whose last bit differs between systems (clippy.toml).
 #![cfg_attr(test, allow(clippy::disallowed_methods))]
-#![allow(unsafe_code)] // pointers of the caller's, and names that C links
+#![allow(unsafe_code)] // because of pointers of the caller, and of functions that C finds by name
 
 mod arguments;
 pub mod clip;

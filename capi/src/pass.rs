@@ -77,7 +77,7 @@ pub struct TumblePass {
     pub offsets: *const f32,
 }
 
-// SAFETY: `repr(C)`, the size is first, and zeros are numbers and null pointers.
+// SAFETY: `repr(C)`, the size is the first member, and zero bits are valid numbers and null pointers.
 unsafe impl SizedStructure for TumblePass {
     const FIRST_SIZE: usize = size_of::<Self>();
 }

@@ -53,7 +53,7 @@ pub struct TumbleRequest {
     pub sample_count: usize,
 }
 
-// SAFETY: `repr(C)`, the size is first, and zeros are numbers and null pointers.
+// SAFETY: `repr(C)`, the size is the first member, and zero bits are valid numbers and null pointers.
 unsafe impl SizedStructure for TumbleRequest {
     const FIRST_SIZE: usize = size_of::<Self>();
 }

@@ -21,8 +21,8 @@ pub enum TumbleResult {
     /// A handle is null, was freed, never existed, or belongs to an object of another type.
     InvalidHandle = 2,
     /// An argument is invalid: an unknown constant or name, a number out of its range, an array that is too large for
-    /// memory, a structure whose `size` is that of no version or of a newer one, text that is not UTF-8, or objects that
-    /// do not belong together.
+    /// memory, a structure whose `size` is not that of a known version, text that is not UTF-8, or objects that do not
+    /// belong together.
     InvalidArgument = 3,
     /// The memory for a result does not have the required size, or a range of a buffer is too short or not aligned.
     WrongSize = 4,
@@ -235,7 +235,7 @@ thread_local! {
 /// successful calls do not change it.
 #[unsafe(no_mangle)]
 pub extern "C" fn tumble_last_error() -> *const c_char {
-    // A thread that ends has no message any more.
+    // While a thread ends, its message may already have been destroyed.
     let message = LAST.try_with(|last| last.borrow().as_ptr());
     message.unwrap_or(c"".as_ptr())
 }
@@ -248,7 +248,7 @@ fn remember(message: &str) {
 
 /// The result of some work. If it fails or panics, the code of the error, whose message is stored for this thread.
 pub(crate) fn guarded<T>(work: impl FnOnce() -> Result<T, Failure>) -> Result<T, TumbleResult> {
-    // After a panic, values that are half changed are dropped, or their lock is poisoned, so nobody can use them.
+    // After a panic, a value that is only partly changed is dropped, or its lock is poisoned. So no later call uses it.
     let done = catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| Err(of_panic(&*panic)));
     done.map_err(|failure| {
         remember(&failure.message);

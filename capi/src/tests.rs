@@ -131,7 +131,7 @@ const KEYS: [[f32; 4]; 3] = [
 ];
 
 fn push(set: *mut TumbleSet, times: *const f64, keys: *const f32, count: usize) -> TumbleResult {
-    // SAFETY: the tests give pointers to as many numbers, or such as are refused.
+    // SAFETY: the tests pass pointers to as many numbers as stated, or pointers that are refused.
     unsafe { tumble_set_push(set, c"joint".as_ptr(), times, keys, count) }
 }
 
@@ -232,7 +232,7 @@ fn a_handle_that_was_freed_or_is_another_is_refused() {
     assert_eq!(tumble_set_track_count(set), 0);
     assert!(tumble_engine_device_name(null()).is_null());
     assert_eq!(tumble_engine_free(null_mut()), TumbleResult::Ok);
-    // A clip keeps what it needs.
+    // A clip works after its engine and its set were freed.
     let (set, mut clip) = (one_track(), null_mut());
     // SAFETY: handles, and room for one.
     let uploaded = unsafe { tumble_upload(engine, set, null(), &raw mut clip) };
@@ -288,7 +288,7 @@ fn pointers_and_sizes_are_checked() {
     fails(shared(3, 1, null_mut()), pointer, "`set` is null");
     assert_eq!(shared(3, 1, &raw mut other), TumbleResult::Ok);
     assert_eq!(tumble_set_key_count(other), 3);
-    // SAFETY: a place that is refused.
+    // SAFETY: the null pointer is refused.
     fails(
         unsafe { tumble_set_new(null_mut()) },
         pointer,
@@ -495,14 +495,14 @@ fn devices_files_and_methods_are_found_or_named() {
     let done = unsafe { tumble_file_clip_set(file, 0, &raw mut set) };
     assert_eq!((done, tumble_set_track_count(set)), (TumbleResult::Ok, 4));
     let (mut times, mut keys, mut count) = (null(), null(), 0);
-    // SAFETY: room for them.
+    // SAFETY: room for the three results.
     let done = unsafe { tumble_set_track(set, 3, &raw mut times, &raw mut keys, &raw mut count) };
     assert_eq!(done, TumbleResult::Ok);
     // SAFETY: keys of a set that is not freed yet.
     let keys = unsafe { std::slice::from_raw_parts(keys.cast::<[f32; 4]>(), count) };
     let object = handle::get(set).unwrap();
     assert_eq!(keys[1], object.read().track(3).keys[1].to_array());
-    // SAFETY: room for them, dangling ones where there is no such track.
+    // SAFETY: the pointers are dangling, but nothing is written, because the track does not exist.
     let done = unsafe { tumble_set_track(set, 4, dangling_mut(), dangling_mut(), dangling_mut()) };
     fails(done, TumbleResult::OutOfRange, "no track 4");
     let mut name = [1 as c_char; 5];

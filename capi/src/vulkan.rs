@@ -66,7 +66,7 @@ pub struct TumbleVulkan {
     pub pipeline_cache: u64,
 }
 
-// SAFETY: `repr(C)`, the size is first, and zeros are numbers, null pointers and no functions.
+// SAFETY: `repr(C)`, the size is the first member, and zero bits are valid numbers, null pointers and absent functions.
 unsafe impl SizedStructure for TumbleVulkan {
     const FIRST_SIZE: usize = offset_of!(Self, pipeline_cache);
 }
@@ -81,7 +81,8 @@ impl User {
     }
 }
 
-// SAFETY: the application promises that its functions take it on any thread.
+// SAFETY: the pointer is only passed to the application's functions, which accept it on any thread, as the application
+// promises.
 unsafe impl Send for User {}
 // SAFETY: as above.
 unsafe impl Sync for User {}

@@ -16,7 +16,7 @@ use crate::messages::listing;
 /// The name of the command that loads the drivers, and does nothing else.
 pub(crate) const COMMAND: &str = "probe-drivers";
 
-/// The output of a process that has loaded the drivers: one that a driver ended has not printed it.
+/// The output of a process that has loaded the drivers. A process that a driver has ended does not print it.
 const LOADED: &str = "tumble: the Vulkan drivers are loaded";
 
 /// The most output that is read from it: as much as a pipe holds.
@@ -36,9 +36,9 @@ fn patience() -> u64 {
         .unwrap_or(PATIENCE)
 }
 
-/// Ends the process when a driver ends it by `exit`: what then runs at the ordinary end waits for the loader's lock,
-/// which the driver's caller holds, and the parent would wait for all of its time limit. Destructors of thread-local
-/// values run before.
+/// Ends the process at once when a driver calls `exit`. Otherwise, functions that run at the end of a process would
+/// wait for the loader's lock, which the driver's caller holds, and the parent would wait until its time limit.
+/// Destructors of thread-local values, such as this one, run before these functions.
 struct EndAtOnce {
     is_loading: Cell<bool>,
 }
@@ -58,7 +58,7 @@ thread_local! {
     };
 }
 
-/// Loads the drivers in this process, and says on standard output that it came through.
+/// Loads the drivers in this process, and then prints a line to standard output: no driver has ended the process.
 pub(crate) fn load() {
     END_AT_ONCE.with(|end| end.is_loading.set(true));
     let _ = Device::list(); // errors occur again where they are reported
@@ -66,13 +66,13 @@ pub(crate) fn load() {
     let _ = listing::text(&format!("{LOADED}\n")); // the parent may have ended
 }
 
-/// Every Vulkan device, once a process has come through loading their drivers.
+/// All Vulkan devices, after another process has loaded their drivers without being ended by one.
 pub(crate) fn devices() -> Result<Vec<Device>, VulkanError> {
     drivers()?;
     Device::list()
 }
 
-/// Whether a process comes through loading the drivers.
+/// Returns an error if loading the drivers ends the process that loads them.
 pub(crate) fn drivers() -> Result<(), VulkanError> {
     static OUTCOME: OnceLock<Result<(), VulkanError>> = OnceLock::new();
     OUTCOME
@@ -100,7 +100,7 @@ fn command() -> Option<Command> {
     Some(command)
 }
 
-/// The error of a process that did not come through.
+/// Loads the drivers in another process; returns the error if this ended the process.
 fn load_elsewhere(seconds: u64) -> Option<VulkanError> {
     let mut child = command()?
         .stdin(Stdio::null())
@@ -130,7 +130,8 @@ fn load_elsewhere(seconds: u64) -> Option<VulkanError> {
     }
 }
 
-/// `has_come_through`: a driver may end the process with any status, 0 too.
+/// The error if a driver has ended the process that loaded it. `has_come_through`: whether the process printed
+/// [`LOADED`]. Its status is not enough, because a driver may end the process with any status, 0 too.
 fn failure_of(status: ExitStatus, has_come_through: bool) -> Option<VulkanError> {
     let how = format!("the process that tried ended with {status}");
     (!status.success() || !has_come_through).then_some(VulkanError::Driver { how })

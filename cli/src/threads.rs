@@ -1,6 +1,6 @@
 //! Work that the engine's threads share.
 
-/// `together`, in which rayon uses the engine's threads. Where the system refuses them, `alone` does the
+/// `together`, in which rayon uses the engine's threads. If the system refuses them, `alone` does the
 /// same on this one.
 pub(crate) fn on_threads<R: Send>(
     together: impl FnOnce() -> R + Send,

@@ -35,7 +35,7 @@ impl FloatControls {
 /// # Errors
 /// A [`SpirvError`] for words that are no complete module.
 pub fn float_controls(module: &[u32], offered: FloatControls) -> Result<Vec<u32>, SpirvError> {
-    // SPIR-V 1.4; by extension before that.
+    // The capabilities and modes are part of SPIR-V 1.4; modules of older versions need an extension.
     let modes: Vec<Mode> = [
         (offered.preserve_signed_zero_inf_nan, (4466, 4461)),
         (offered.round_to_nearest_even, (4467, 4462)),

@@ -194,7 +194,8 @@ pub(crate) fn found(code: &[Instruction<'_>], halves: HalfFloats) -> Vec<Inexact
     const LINE: u16 = 8;
     const NO_LINE: u16 = 317;
     const FUNCTION_END: u16 = 56;
-    // The sets of extended instructions: those that compute nothing, and that of GLSL.
+    // The ids of the imported sets of extended instructions: of the sets that compute nothing, such as debug
+    // information, and of GLSL's set.
     let (mut silent, mut glsl) = (BTreeSet::new(), BTreeSet::new());
     let mut line = None;
     let mut all = Vec::new();

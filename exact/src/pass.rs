@@ -4,8 +4,8 @@
 //! them a driver may fuse a multiplication with an addition, or rewrite `(a + b) - a` to `b`. The pass decorates every float
 //! operation, and refuses a module that uses an operation whose rounding Vulkan leaves open.
 //!
-//! Vectors times scalars have an opcode of their own, which translators of SPIR-V treat apart: SPIRV-Cross,
-//! by which Metal runs SPIR-V, drops `NoContraction` on it. They become products of two vectors.
+//! The product of a vector and a scalar has a special opcode. SPIRV-Cross, which translates SPIR-V for Metal, ignores
+//! `NoContraction` on it. Therefore the pass replaces it by a product of two vectors.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -18,14 +18,14 @@ pub(crate) const NO_CONTRACTION: u32 = 42;
 /// The storage class of storage buffers.
 const STORAGE_BUFFER: u32 = 12;
 const NAME_LAST: [u16; 6] = [3, 4, 5, 6, 7, 330]; // OpSource … OpModuleProcessed
-/// Correctly rounded by Vulkan ("Precision and Operation of SPIR-V Instructions").
+/// The operations that Vulkan requires to be correctly rounded ("Precision and Operation of SPIR-V Instructions").
 const EXACT: [u16; 4] = [127, 129, 131, op::MULTIPLY]; // FNegate FAdd FSub FMul
 
 /// Why the pass refuses a module.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PassError {
-    /// It is no complete module.
+    /// The words are not a complete module.
     #[error(transparent)]
     Spirv(#[from] SpirvError),
     /// An operation whose result Vulkan does not define to the last bit. [`inexact`](crate::inexact) lists all of them.

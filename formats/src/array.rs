@@ -1,8 +1,8 @@
 //! Arrays of numbers, and the header of an NPY array: element type, order and shape.
 //!
-//! The header is parsed here, not by a crate, because the header of a damaged or hostile file can contain anything: the crate
-//! `npyz` multiplies shapes without checking their size, allocates memory by the length that a header claims for
-//! itself, and parses nested brackets twice at each level. Tests read the written headers with it.
+//! The header is parsed here, not by a crate, because the header of a damaged or hostile file can contain anything. The
+//! crate `npyz` multiplies shapes without checking their size, allocates memory by the length that a header claims for
+//! itself, and parses nested brackets twice at each level. Tests read the written headers with `npyz`.
 
 use std::fmt;
 

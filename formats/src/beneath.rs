@@ -104,7 +104,7 @@ fn open(folder: &Path, name: &Path) -> io::Result<File> {
 
     let root = OFlags::PATH | OFlags::DIRECTORY | OFlags::CLOEXEC;
     let root = open(folder, root, Mode::empty())?;
-    // Without this flag, opening a pipe would wait for its writer.
+    // `NONBLOCK`: without it, opening a pipe would wait for the pipe's writer.
     let flags = OFlags::RDONLY | OFlags::CLOEXEC | OFlags::NONBLOCK | OFlags::NOCTTY;
     let resolve = ResolveFlags::BENEATH | ResolveFlags::NO_MAGICLINKS;
     for _ in 0..100 {
@@ -113,7 +113,7 @@ fn open(folder: &Path, name: &Path) -> io::Result<File> {
             // A part of the path was renamed while it was opened: try again.
             Err(Errno::AGAIN) => {}
             Err(Errno::XDEV | Errno::LOOP) => return Err(leads_out()),
-            // A socket, or a device without a driver.
+            // The name is that of a socket, or of a device without a driver.
             Err(Errno::NXIO | Errno::NODEV) => return Err(no_file()),
             // The call does not exist before Linux 5.6, and some sandboxes forbid it.
             Err(Errno::NOSYS | Errno::PERM) => break,

@@ -16,14 +16,14 @@ const LARGEST: i128 = 100_000_000_000_000 * SECOND;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Decimal(i128);
 
-/// If the first time is at least this many seconds from 0, times count from its whole second: the step of an f64 of
-/// Unix seconds is 0.2 µs, and one that starts at 0 keeps nanoseconds for 104 days.
+/// If the first time is at least this many seconds from 0, times count from its whole second. The reason is that an f64
+/// of seconds since 1970 has steps of 0.2 µs; seconds from 0 are exact to a nanosecond for 104 days.
 const OFFSET_LIMIT: u64 = 1_000_000;
 
-/// Larger times are not seconds since 1970: it is the year 5138.
+/// The largest time that is taken for seconds since 1970; it is in the year 5138.
 pub(crate) const LARGEST_SECONDS: f64 = 1e11;
 
-/// The whole second from which times count whose first one has the whole second `first`.
+/// The whole second from which times count, if `first` is the whole second of the first time.
 pub(crate) fn offset_of(first: i64) -> i64 {
     match first.unsigned_abs() < OFFSET_LIMIT {
         true => 0,
@@ -46,17 +46,17 @@ pub(crate) fn time_text(whole: i64, time: f64) -> String {
     }
 }
 
-/// Number of decimals in seconds of a number in a unit of `10^power` seconds. Digits after those that an f64 has do
-/// not count where they are those of an f64: `numpy.savetxt` prints 18 decimals of any number, and 1700000000.05
-/// becomes 1700000000.049999952….
+/// Number of decimals in seconds of a number in a unit of `10^power` seconds. If the digits are those of an f64 printed
+/// with more digits than it has, only the digits that it has count: `numpy.savetxt` prints 18 decimals of any number,
+/// and 1700000000.05 becomes 1700000000.049999952….
 pub(crate) fn decimal_count(token: &str, power: i32) -> u32 {
     let last = last_digit_power(token);
     let exact = f64_power(token, last).unwrap_or(last);
     exact.saturating_add(power).min(0).unsigned_abs()
 }
 
-/// The power of ten of the last digit that the f64 of a number determines, if the number has more digits and they are
-/// those of this f64. `last` is the power of its last digit.
+/// For a number that is the decimal expansion of an f64 with more digits than the f64 determines: the power of ten of
+/// the last digit that it determines. Otherwise `None`. `last` is the power of the number's last digit.
 fn f64_power(token: &str, last: i32) -> Option<i32> {
     let mantissa = token.split(['e', 'E']).next().unwrap_or_default();
     let digits = mantissa.bytes().filter(u8::is_ascii_digit);
@@ -122,7 +122,8 @@ impl Decimal {
 
     /// The sum of whole seconds and a time with its shortest decimals; `None` outside ±1e14.
     pub(crate) fn of(whole: i64, time: f64) -> Option<Self> {
-        // The difference to the first time may have twice as many whole digits as a time.
+        // The whole seconds are added in i128, because `time` may be a difference from the first time, and so larger
+        // than any time.
         let digits = time.to_string();
         let (seconds, decimals) = digits.split_once('.').unwrap_or((&digits, "0"));
         let seconds = i128::from(whole) + seconds.parse::<i128>().ok()?;
@@ -155,7 +156,7 @@ impl Decimal {
     /// Seconds after a whole second, correctly rounded.
     pub(crate) fn since(self, whole: i64) -> f64 {
         match self.0.checked_sub(i128::from(whole) * SECOND) {
-            // Digits and a point.
+            // The text of the difference has only digits and a point, so it can be parsed as an f64, correctly rounded.
             Some(difference) => Self(difference).to_string().parse().unwrap_or(f64::NAN),
             // Such a number is a whole number in f64, so its whole seconds are exact.
             None => {

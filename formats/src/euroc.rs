@@ -125,7 +125,7 @@ fn write_motion(
         let (rotation, position) = path.pose(sample)?;
         let [x, y, z] = position;
         let [qx, qy, qz, qw] = rotation.to_array();
-        // Writing to memory cannot fail.
+        // The result is ignored, because writing to memory cannot fail.
         let _ = writeln!(text, "{nanoseconds},{x},{y},{z},{qw},{qx},{qy},{qz}");
         out.write_all(text.as_bytes())?;
         text.clear();

@@ -47,14 +47,15 @@ pub struct Format {
     /// Whether names of tracks must be unique in a file. A repeated name is then written with the track's number
     /// after it, and a warning is returned. For writers that warn themselves this is `false`.
     pub numbers_repeated_names: bool,
-    /// Whether times of which the first is too large for seconds are read as times in a smaller unit (W305). Such
-    /// seconds are not written.
+    /// Whether times are read in a smaller unit if the first one is too large to be in seconds (W305). Times in seconds
+    /// that would be misread in this way are not written.
     pub guesses_time_unit: bool,
     /// Reads clips from a file; `-` is standard input.
     pub read: ReadKeys,
     /// Reads clips from the bytes of a file. Other files that it names are not read.
     pub read_bytes: ReadBytes,
-    /// Writes the rotations of a result in parts, while they are computed; `None` if the format cannot store them so.
+    /// Writes the rotations of a result in parts, while they are computed; `None` if the format cannot be written in
+    /// parts.
     pub write: Option<WriteResults>,
     /// How sampled clips are written: see [`Format::write_clips`].
     pub(crate) write_motion: Option<WriteMotion>,
@@ -285,7 +286,7 @@ pub enum Adjustment {
 }
 
 impl Adjustment {
-    /// Why a new file is made of the clips, as [`left_behind`] begins its message.
+    /// The reason why the clips are written as a new file; [`left_behind`] begins its message with it.
     #[must_use]
     pub fn makes_new(self) -> &'static str {
         match self {

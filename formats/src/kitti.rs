@@ -136,7 +136,7 @@ pub fn read_kitti(
                 let message = "the first three columns of the matrix are not a rotation".to_owned();
                 return Err(lines.refuse(1, Code::NoRotation, message));
             };
-            // A matrix has no sign.
+            // A matrix does not determine the sign of the quaternion, so the sign of the pose before is continued.
             let last = poses.rotations.last();
             let is_negated = last.is_some_and(|last: &DQuat| last.dot(rotation) < 0.0);
             poses

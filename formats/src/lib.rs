@@ -15,7 +15,7 @@
 //! Formats of other files have tables of the same kind: [`SURFACES`] for meshes and nets of control points
 //! ([`surface`]), and [`PATHS`] for paths ([`path`]).
 
-// Tests may use what systems round differently (clippy.toml).
+// Tests may use functions whose last bit differs between systems (clippy.toml).
 #![cfg_attr(test, allow(clippy::disallowed_methods))]
 
 mod array;

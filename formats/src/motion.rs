@@ -78,8 +78,8 @@ pub struct Motion {
     pub origins: Vec<DVec3>,
     /// Why poses in the world cannot be computed; `None` if they can.
     pub no_world: Option<String>,
-    /// How the file wrote the joint of each track, which a file in its format repeats; empty if the file does not
-    /// contain it.
+    /// How the file wrote the joint of each track, so that a new file in the same format can write it in the same way;
+    /// empty if the file does not contain it.
     pub written_joints: Vec<WrittenJoint>,
     /// The data of an SMPL body, if the clip is the motion of one.
     pub body: Option<Body>,
@@ -87,8 +87,8 @@ pub struct Motion {
     pub robot: Option<RecordedRobot>,
 }
 
-/// The whole second from which times in f64 count, the [`time_offset`](Motion::time_offset) of a clip with them: 0 for
-/// most times, and the second at or before the first one where a clock counts from 1970.
+/// The whole second to subtract from these times, which becomes the [`time_offset`](Motion::time_offset) of their clip.
+/// For most times it is 0; for times of a clock that counts from 1970, it is the second at or before the first time.
 #[must_use]
 pub fn clock_second<'a>(times: impl IntoIterator<Item = &'a f64>) -> i64 {
     let first = times.into_iter().copied().fold(f64::INFINITY, f64::min);
@@ -116,9 +116,9 @@ impl Motion {
         }
     }
 
-    /// The time in the set of a requested time. If the times of the set are counted from a
-    /// [`time_offset`](Self::time_offset), a time that is nearer to it than to 0 is one of the file, for example
-    /// 1700000000.5; others count from it.
+    /// The time in the set of a requested time. A clip with a [`time_offset`](Self::time_offset) accepts both times of
+    /// the file and times of the set. A time that is nearer to the offset than to 0, for example 1700000000.5, is a
+    /// time of the file, so the offset is subtracted. All other times are times of the set.
     #[must_use]
     pub fn time_in_set(&self, time: f64) -> f64 {
         let offset = self.time_offset as f64;
@@ -129,7 +129,7 @@ impl Motion {
         }
     }
 
-    /// The [times in the set](Self::time_in_set) of a start and an end; those of `whole` where none is asked for.
+    /// The [times in the set](Self::time_in_set) of a start and an end; if one is not requested, that of `whole`.
     #[must_use]
     pub fn range_in_set(
         &self,
@@ -158,8 +158,9 @@ impl Motion {
         }
     }
 
-    /// The assumption by which some joints are matched with those of other clips, for a warning: several joints of one
-    /// parent have one name in the file, so that only their order tells them apart. `None` if nothing is assumed.
+    /// A text for a warning if several joints of one parent have the same name in the file, so that only their order
+    /// distinguishes them. It says that their order is assumed to be the same in other clips. `None` if there are no
+    /// such joints.
     #[must_use]
     pub fn order_assumption(&self, input: &str) -> Option<String> {
         let tracks = 0..self.set.track_count();
@@ -227,7 +228,7 @@ impl Motion {
         self.has_keys_of(Channel::Translation) || self.has_keys_of(Channel::Scale)
     }
 
-    /// Whether the tracks are boxes of a chain: rotations alone, without a skeleton, positions or scalars.
+    /// Whether the tracks are boxes of a chain: only rotations, without a skeleton, positions or scalars.
     #[must_use]
     pub fn is_chain(&self) -> bool {
         self.skeleton.is_empty() && !self.has_vectors() && self.set.scalar_count() == 0
@@ -239,7 +240,7 @@ impl Motion {
         self.origins.get(track).copied().unwrap_or_default()
     }
 
-    /// Where a joint rests relative to its parent: its rest translation with its [origin](Self::origins).
+    /// The rest position of a joint relative to its parent: its rest translation plus its [origin](Self::origins).
     #[must_use]
     pub fn rest_position(&self, track: usize) -> DVec3 {
         self.origin(track) + self.rest(Channel::Translation, track).as_dvec3()
@@ -451,9 +452,9 @@ pub struct SampledClip<'a> {
     pub rate: Option<FrameRate>,
     /// Unit quaternions with continued signs: each is nearer to the one before in its track than its negative.
     pub rotations: &'a [Quat],
-    /// Translations of all tracks; empty where no track has any.
+    /// Translations of all tracks; empty if no track has any.
     pub translations: &'a [Vec3],
-    /// Scales of all tracks; empty where no track has any.
+    /// Scales of all tracks; empty if no track has any.
     pub scales: &'a [Vec3],
     /// All scalars of the clip, in the order `[sample][scalar]`.
     pub scalars: &'a [f32],

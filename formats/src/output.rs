@@ -267,8 +267,8 @@ pub fn remove_marked(directory: &Path, mark: &str) {
     });
 }
 
-/// As [`remove_abandoned`], of the temporary files that were created with `mark` alone: those of a worker of this machine
-/// that was killed, not those of one that still runs.
+/// As [`remove_abandoned`], but only for temporary files that were created with `mark`. Files of a worker that still
+/// runs on this machine are kept; those of a worker that was killed are removed.
 pub fn remove_abandoned_marked(directory: &Path, mark: &str) {
     remove_temporary(directory, |folder, name, of_file| {
         let is_marked = of_file.starts_with(mark);
@@ -276,9 +276,9 @@ pub fn remove_abandoned_marked(directory: &Path, mark: &str) {
     });
 }
 
-/// Removes those of a directory's temporary files for which `claim` returns something, which lives until the file is
-/// removed: a writer that could lock its new file before that would lose it. `claim` gets the directory, the name and
-/// the mark in the name.
+/// Removes the temporary files of a directory for which `claim` returns a value, such as a lock. The value lives until
+/// the file is removed. Otherwise a writer could lock its new file meanwhile, and would lose it. `claim` gets the
+/// directory, the name and the mark in the name.
 fn remove_temporary<T>(directory: &Path, claim: impl Fn(&Folder, &OsStr, &str) -> Option<T>) {
     let Ok(folder) = Folder::open(directory) else {
         return;

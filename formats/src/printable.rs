@@ -1,8 +1,8 @@
 //! Escapes texts of other programs before they are displayed: names, paths, headers, lists.
 //!
-//! A terminal executes control characters: an escape sequence in the name of a joint moves the cursor, a line end in
-//! a file's name begins a line that looks like a verdict, and a direction mark reverses the words after it. Such
-//! characters are displayed as escapes, for example `\u{1b}`.
+//! A terminal executes control characters. An escape sequence in the name of a joint moves the cursor. A line end in a
+//! file's name begins a line that looks like a verdict. A direction mark reverses the words after it. Such characters
+//! are displayed as escapes, for example `\u{1b}`.
 
 use std::borrow::Cow;
 use std::fmt::Write as _;

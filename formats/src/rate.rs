@@ -100,8 +100,8 @@ pub(crate) fn of(written: &RateSource<'_>) -> Option<FrameGrid> {
     }
 }
 
-/// The rate whose frame time, added up in f32 from the first time on, gives exactly these times: some exporters do so,
-/// and after some seconds the sums are further from the frames than rounding explains.
+/// The rate whose frame time, added up in f32 from the first time on, gives exactly these times. Some exporters compute
+/// times in this way; after some seconds the sums are further from the frames than rounding explains.
 pub(crate) fn of_sums(lists: &[Vec<f64>]) -> Option<FrameRate> {
     let mut times: Vec<f64> = lists.iter().flatten().copied().collect();
     times.sort_by(f64::total_cmp);
@@ -230,11 +230,12 @@ pub(crate) fn overridden(rate: FrameRate, other: FrameRate) -> String {
     )
 }
 
-/// The rate of a frame time with these digits: an integer number of frames whose time is written so, or such a number
-/// times 1000/1001, or the number itself. Digits may have been rounded, as in 0.017, or cut off, as in 0.0166. If several
-/// rates are possible, the common one is chosen if there is only one. A rate that would change the duration by more than
-/// [`MAX_CHANGE`], or for digits that were cut off by more than [`UNNOTICED`], is not meant. Some programs print the
-/// digits of an f32, so that the time may also have been rounded to f32. `None` for times outside 1e-9 s to 1e9 s.
+/// The rate of a frame time with these digits. Candidates are the whole rates whose frame time is written with these
+/// digits, such rates times 1000/1001, and last the number itself. Digits may have been rounded, as in 0.017, or cut
+/// off, as in 0.0166. If several rates are possible and exactly one of them is a usual rate, that one is chosen. A rate
+/// is not considered if it would change the duration by more than [`MAX_CHANGE`], or, for digits that were cut off, by
+/// more than [`UNNOTICED`]. Some programs print the digits of an f32, so that the time may also have been rounded to
+/// f32. `None` for times outside 1e-9 s to 1e9 s.
 fn of_period(digits: &str) -> Option<FrameRate> {
     let period: f64 = digits.parse().ok()?;
     if !(1e-9..=1e9).contains(&period) {
@@ -465,7 +466,8 @@ fn shortest(number: f64, near: f64) -> f64 {
     decimals.into_iter().find(is_near).unwrap_or(number)
 }
 
-/// The frames of times; `None` if they cannot be distinguished.
+/// The windows of time in which the frames can be; times whose windows overlap count as one time. `None` if fewer than
+/// two windows remain.
 fn windows(times: &[f64], precision: Precision) -> Option<Vec<TimeWindow>> {
     let mut all: Vec<TimeWindow> = Vec::new();
     for &time in times {

@@ -1,5 +1,5 @@
-//! The files that an input refers to. They belong to the identity of the input: when one of them changes, so does what
-//! the input contains.
+//! The files that an input refers to. They belong to the identity of the input: when one of them changes, the content
+//! of the input changes too.
 
 use std::fs::File;
 use std::io;
@@ -14,8 +14,8 @@ use crate::parquet;
 use crate::robot::{self, Robot};
 
 /// The files that reading `path` also reads, as paths relative to its folder, in order and each once. Whether they
-/// exist is not checked. There are none for standard input, for what is not a regular file, and for a file that is
-/// invalid, which opening it reports.
+/// exist is not checked. There are none for standard input, for paths that are not regular files, and for invalid
+/// files, whose error is reported when they are opened.
 ///
 /// glTF refers to its buffers, the MJCF of a robot to the files that it includes, and a table of `LeRobot` to the description
 /// of its data set. Of FBX, nothing outside the file is

@@ -32,8 +32,8 @@ pub struct RetargetOptions {
     pub bones: Vec<(String, String)>,
     /// How the rest poses are compared.
     pub rest: RestAlignment,
-    /// The key of the source whose pose counts as the source's rest pose, from 0; `None` for the skeleton's own. Takes of
-    /// motion capture often begin in a T-pose, and rest in another.
+    /// The key of the source whose pose counts as the source's rest pose, from 0; `None` for the rest pose of the
+    /// skeleton. Takes of motion capture often begin in a T-pose, while their skeleton has another rest pose.
     pub rest_frame: Option<usize>,
     /// The factor for the translations of the hips.
     pub scale: HipsScale,
@@ -45,12 +45,13 @@ pub struct RetargetOptions {
 /// How the rest poses of two skeletons are compared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum RestAlignment {
-    /// By directions if those of a limb differ by more than 5°, else as the same.
+    /// [`Directions`](Self::Directions) if the directions of a limb differ by more than 5°, otherwise
+    /// [`Same`](Self::Same).
     #[default]
     Auto,
-    /// Both stand alike: nothing is aligned.
+    /// The rest poses are the same: nothing is aligned.
     Same,
-    /// The limbs of the target are turned to the directions of the source's.
+    /// The limbs of the target's rest pose are rotated to the directions that the source's limbs have at rest.
     Directions,
 }
 
@@ -84,7 +85,7 @@ pub struct RetargetReport {
     pub dropped: Vec<String>,
     /// The dropped joint that rotates furthest from its rest pose, and this angle in degrees; `None` if all rest.
     pub furthest_dropped: Option<(String, f64)>,
-    /// By how many degrees the rest pose of each joint of the target was aligned, where it was.
+    /// The joints of the target whose rest pose was aligned, each with the angle in degrees.
     pub aligned: Vec<(String, f64)>,
     /// The factor by which the translations of the hips were multiplied.
     pub scale: f64,
@@ -92,22 +93,23 @@ pub struct RetargetReport {
     pub axes: DQuat,
     /// Whether `axes` was neither given nor found, and is the identity.
     pub are_axes_assumed: bool,
-    /// The axis along which the source, an SMPL body, stands on average, if the clip does not state what points up and this
-    /// is not y. The motion was then rotated, so that y points up.
+    /// For a source that is an SMPL body: the axis along which it stands on average, if this is not y and the clip does
+    /// not state which axis points up. The motion was then rotated, so that y points up.
     pub stood_along: Option<DVec3>,
-    /// The axes along which the source stands in its rest pose and, on average, in the motion, if they differ. Another pose is
-    /// then needed as the rest pose, such as one of the motion ([`RetargetOptions::rest_frame`]).
+    /// The axes along which the source stands in its rest pose and, on average, in the motion, if these two differ.
+    /// Then another pose must be used as the rest pose, such as one of the motion ([`RetargetOptions::rest_frame`]).
     pub rests_along: Option<[DVec3; 2]>,
-    /// How far a joint of the source other than the hips moves away from where it rests, in its unit, which is lost.
+    /// The translations that are lost: the largest distance of a joint of the source, other than the hips, from its
+    /// rest position, in the source's unit.
     pub dropped_translation: f64,
     /// The largest angle in radians between the differences from rest of a joint and of its partner, caused by
     /// rounding.
     pub largest_difference: f64,
-    /// How far hands and feet come away from where the source's are, relative to the hips and to the height of the hips: by
-    /// the names of the target's joints. Empty where a skeleton is not recognised.
+    /// For each hand and foot, by the name of the target's joint: its largest distance from the source's, both relative
+    /// to the hips, in heights of the hips. Empty if a skeleton is not recognised.
     pub ends: Vec<(String, f64)>,
-    /// How far a foot of the target comes below the lowest joint at rest, in the target's unit; 0 where it does not, or
-    /// where the skeleton is not recognised.
+    /// The largest distance of a foot of the target below the lowest joint of the rest pose, in the target's unit; 0 if
+    /// no foot is below it, or if the skeleton is not recognised.
     pub below_ground: f64,
 }
 
@@ -121,7 +123,7 @@ pub enum RetargetError {
         /// `source` or `target`.
         which: &'static str,
     },
-    /// A skeleton's joints have no names that are known.
+    /// The names of a skeleton's joints are not known.
     #[error(
         "the joints of the {which} are not those of a known human skeleton: {}; pair them by `bones`",
         missing_text(missing)
@@ -135,7 +137,7 @@ pub enum RetargetError {
     /// The positions of the source's joints are not known.
     #[error("{0}")]
     NoPositions(String),
-    /// A joint of `bones` does not exist, or is there twice.
+    /// A joint in `bones` does not exist, or occurs twice.
     #[error("bones: the {which} has no joint `{name}`, or it is paired twice")]
     Bone {
         /// `source` or `target`.
@@ -157,7 +159,7 @@ pub enum RetargetError {
     /// The keys of the source are at different times.
     #[error(transparent)]
     Keyed(#[from] KeyedError),
-    /// The parents are no hierarchy.
+    /// The parents do not form a hierarchy.
     #[error(transparent)]
     Hierarchy(#[from] HierarchyError),
     /// The motion cannot be stored.
@@ -241,8 +243,8 @@ impl<'a> Rig<'a> {
         self.names.iter().position(|joint| joint == name)
     }
 
-    /// Places the rest pose on the ground, at height 0, with its root above the origin. The rest pose of an SMPL body is that
-    /// of its model, which is placed at no certain height; its motion is relative to the ground.
+    /// Places the rest pose on the ground, at height 0, with its root above the origin. This is necessary for SMPL
+    /// bodies: their motion is relative to the ground, but the rest pose of the model has an arbitrary height.
     fn stand_on_ground(&mut self) {
         let root = { self.order.iter() }.find(|&&joint| self.parents[joint].is_none());
         let lowest = self.rest.positions.iter().map(|point| point.y);
@@ -256,7 +258,7 @@ impl<'a> Rig<'a> {
     }
 }
 
-/// Some samples of a motion, up to 64.
+/// The indices of up to 64 samples of a motion, spread evenly.
 fn some_of(samples: usize) -> impl Iterator<Item = usize> {
     (0..samples).step_by(samples.div_ceil(64).max(1))
 }
@@ -316,7 +318,8 @@ pub fn retarget(
         );
         (samples.rotations[index].as_dquat().normalize(), position)
     };
-    // A body rests in the axes of its model, with y up, and moves in those of its world.
+    // The rest pose of a body model (SMPL) has y up, but its motion has the axes of the file's world. So the motion is
+    // rotated to y up.
     let mut stood_along = None;
     let mut to_model = DQuat::IDENTITY;
     if let Some(body) = &source.body {
@@ -458,7 +461,7 @@ pub fn retarget(
     }
     let mut motion = motion.with_scalars_of(source, 1.0)?;
     if let Some(body) = &mut motion.body {
-        // The rest pose that it was carried to is that of the model.
+        // The motion was rotated to the axes of the model, in which y is up.
         body.up = Some(DVec3::Y);
     }
     if !source.channels.is_empty() {
@@ -515,7 +518,7 @@ pub fn retarget(
     Ok((motion, report))
 }
 
-/// The rotation of a joint that rests, in degrees, at most: that of rounded keys.
+/// The maximum rotation in degrees of a joint that counts as resting; rounded keys rotate by less.
 const RESTS: f64 = 0.01;
 
 /// Where the joints of the target are with these rotations in the world, and the hips at this position in their parent.
@@ -543,7 +546,7 @@ struct Ends {
     /// The hips of the source and of the target, and their heights above the ground.
     hips: [(usize, f64); 2],
     up: DVec3,
-    /// How high the target's lowest joint is at rest.
+    /// The height of the target's lowest joint at rest.
     ground: f64,
     /// Hands and feet: of the source and of the target, whether it is a foot, and the largest distance so far.
     all: Vec<([usize; 2], bool, f64)>,
@@ -617,8 +620,8 @@ impl Ends {
     }
 }
 
-/// The axes of a skeleton by where its parts are at rest: its left, up and forward as columns, each along an axis of the
-/// coordinates. `None` where they are not told apart.
+/// The axes of a skeleton, from the positions of its parts at rest: left, up and forward as columns, each along an axis
+/// of the coordinates. `None` if left and up are not clear.
 fn axes_of(rig: &Rig<'_>, roles: &Roles) -> Option<DQuat> {
     let at = |role| roles.joint(role).map(|joint| rig.rest.positions[joint]);
     let up = nearest_axis(at(Role::Head)? - at(Role::Hips)?)?;
@@ -626,8 +629,8 @@ fn axes_of(rig: &Rig<'_>, roles: &Roles) -> Option<DQuat> {
     (up.dot(left) == 0.0).then(|| DQuat::from_mat3(&DMat3::from_cols(left, up, left.cross(up))))
 }
 
-/// The limb, or the trunk, whose direction at rest is furthest from that in a T-pose with y up that faces z, without the
-/// rotations of the joints at rest: its first and its last joint, and the angle in degrees.
+/// The limb, or the trunk, whose direction at rest differs most from the direction in a T-pose with y up that faces z:
+/// its first and its last joint, and the angle in degrees. The rotations of the joints at rest are ignored.
 #[must_use]
 pub fn furthest_from_t_pose(clip: &Motion, roles: &Roles) -> Option<([usize; 2], f64)> {
     let limbs = [
@@ -657,7 +660,7 @@ pub fn furthest_from_t_pose(clip: &Motion, roles: &Roles) -> Option<([usize; 2],
 struct Pairs {
     /// The joint of the source for each joint of the target.
     source_of: Vec<Option<usize>>,
-    /// The joints whose way is followed: of the target and of the source.
+    /// The hips of the target and of the source: the target's hips follow the path of the source's.
     hips: Option<(usize, usize)>,
 }
 
@@ -669,7 +672,8 @@ impl Pairs {
         Self { source_of, hips }
     }
 
-    /// The joints of both skeletons that have one role, and those without a role that have one name below partners.
+    /// Pairs the joints of both skeletons that have the same role; and, below these, joints without a role that have
+    /// the same name.
     fn by_roles(
         from: &Rig<'_>,
         to: &Rig<'_>,
@@ -754,7 +758,7 @@ impl Pairs {
         pairs.map(names).collect()
     }
 
-    /// The nearest joint above that has a partner.
+    /// The nearest ancestor that has a partner.
     fn above(&self, to: &Rig<'_>, joint: usize) -> Option<usize> {
         let mut above = to.parents[joint];
         while let Some(next) = above.filter(|&next| self.source_of[next].is_none()) {

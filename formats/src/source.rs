@@ -1,4 +1,4 @@
-//! Opens inputs, and checks what a path is before a byte is read.
+//! Opens inputs, and checks the kind of a path (file, directory, pipe, device) before a byte is read.
 
 use std::fs::{File, Metadata};
 use std::io::{self, BufRead, BufReader, Read};

@@ -21,12 +21,12 @@ pub(crate) enum TimeOrder {
     },
 }
 
-/// The least number of rows that ascend on average, for a table whose order tells of a clock. In a random order it
+/// The mean length of ascending runs of rows from which on the order is taken for that of a clock. In a random order it
 /// is two.
 const LEAST_RUN: usize = 3;
 
-/// The least number of rows of both runs that lie between each other's. One row that comes late lies alone between
-/// others.
+/// The least number of rows of each of two runs whose times lie between times of the other run. A single late row does
+/// not count as a run.
 const LEAST_MIXED: usize = 2;
 
 /// Finds the order of times, without NaN.

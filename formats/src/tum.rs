@@ -447,7 +447,7 @@ fn write_motion(
         let (rotation, position) = path.pose(sample)?;
         let [x, y, z] = position;
         let [qx, qy, qz, qw] = rotation.to_array();
-        // Writing to memory cannot fail.
+        // The result is ignored, because writing to memory cannot fail.
         let _ = writeln!(text, "{digits} {x} {y} {z} {qx} {qy} {qz} {qw}");
         out.write_all(text.as_bytes())?;
         text.clear();

@@ -19,20 +19,20 @@ use crate::errors::expected;
 /// `Clip(times, keys, *, order="xyzw", layout=None, name=None, names=None, parents=None, offsets=None,
 /// translations=None, scales=None, velocities=None, tangents=None, tcb=None, scalars=None)`
 ///
-/// `times` are seconds, increasing: `(keys,)` for all tracks, `(tracks, keys)`, or a list with an array for each track.
-/// `keys` are unit quaternions: `(keys, 4)` for one track, `(tracks, keys, 4)`, or a list with an array `(keys, 4)` for
-/// each track; or SciPy's `Rotation`, or a list of them. `order` says what the four components of `keys` are. `layout`:
-/// "frame" for arrays of shape `(frames, tracks, …)`, "track" for `(tracks, keys, …)`; it is needed only if there are
-/// as many tracks as keys.
+/// `times` are seconds, increasing: `(keys,)` for all tracks, `(tracks, keys)`, or a list with an array for each
+/// track. `keys` are unit quaternions: `(keys, 4)` for one track, `(tracks, keys, 4)`, or a list with an array
+/// `(keys, 4)` for each track; or SciPy's `Rotation`, or a list of them. `order` is the order of the four
+/// components of `keys`. `layout`: "frame" for arrays of shape `(frames, tracks, …)`, "track" for `(tracks, keys,
+/// …)`; it is needed only if there are as many tracks as keys.
 ///
 /// Unix times are stored relative to the clip's `time_offset`, the whole second before the first key, so that no digits
 /// are lost. `at`, `start` and `end` accept both.
 ///
 /// For each track: `names`, text; `parents`, the index of its parent track (`None` or -1 for a root); `offsets`,
-/// `(tracks, 3)`, where it rests in its parent's frame. For each key, as arrays or lists like `keys` with 3 components
-/// instead of 4: `translations`, `scales`, and what some methods use: `velocities` (rad/s, body frame; `hermite`),
-/// `tangents` (`(…, 2, 4)`, before and after each key, per second; `gltf-cubic`), `tcb` (tension, continuity, bias;
-/// `kochanek-bartels`).
+/// `(tracks, 3)`, its rest position in its parent's frame. For each key, as arrays or lists like `keys` with 3
+/// components instead of 4: `translations` and `scales`. Some methods use further data: `velocities` (rad/s, body
+/// frame; `hermite`), `tangents` (`(…, 2, 4)`, before and after each key, per second; `gltf-cubic`), `tcb`
+/// (tension, continuity, bias; `kochanek-bartels`).
 ///
 /// `scalars` are numbers over time beside the tracks, such as the angles of a robot's joints: a dict with a pair
 /// `(times, keys)` for each name.

@@ -21,13 +21,14 @@ pub(crate) const MIN_DEVICE_ROTATIONS: usize = 1 << 20;
 ///
 /// `Engine(device="auto", *, memory=None, threads=None, allow_inexact=False, cache=None)`
 ///
-/// `device`: "auto", the CPU, and for calls of a million rotations or more the device that is
-/// measured to be the fastest; "cpu"; "first", the first Vulkan device that is exact, else the CPU;
-/// "vulkan"; or a device's index or part of its name (`tumble.devices()`). All give the same bits.
-/// `memory`: bytes of a Vulkan device that segments may take; `threads`: of the CPU;
-/// `allow_inexact`: use a device that fails its self-test. `cache`: the directory in which a Vulkan
-/// device's compiled kernels, checks and speed are kept; "off" keeps no files, "user", the default,
-/// is `TUMBLE_CACHE_DIR` or the user's cache directory.
+/// * `device`: "auto", the CPU, and for calls of a million rotations or more the device that is measured to be the
+///   fastest; "cpu"; "first", the first Vulkan device that is exact, else the CPU; "vulkan"; or a device's index or
+///   part of its name (`tumble.devices()`). All give the same bits.
+/// * `memory`: bytes of a Vulkan device that segments may take.
+/// * `threads`: the number of threads of the CPU.
+/// * `allow_inexact`: use a device that fails its self-test.
+/// * `cache`: the directory in which a Vulkan device's compiled kernels, checks and speed are kept; "off" keeps no
+///   files, "user", the default, is `TUMBLE_CACHE_DIR` or the user's cache directory.
 ///
 /// An engine may be used by several threads at once. The interpreter's lock is released while it
 /// works, and Ctrl-C ends a long evaluation.

@@ -195,8 +195,9 @@ pub(crate) fn root_motion<'py>(
     PyTuple::new(py, all)
 }
 
-/// The places (frames, 3) and headings (frames,) of a root motion after so many whole `loops`, each of which begins where
-/// the last one ended; float64. Negative numbers are loops before. Rounding does not grow with their number.
+/// The positions (frames, 3) and headings (frames,) of a root motion after `loops` whole loops, each of which
+/// begins where the one before ended; float64. A negative number means loops before the first. Rounding errors do
+/// not grow with the number of loops.
 ///
 /// >>> import tumble
 /// >>> ahead = [[0, 0, 0], [1, 0, 0]]
@@ -255,10 +256,11 @@ fn odd_window(window: &Bound<'_, PyAny>) -> PyResult<usize> {
     }
 }
 
-/// Which bodies touch the ground: bool (…), of `positions` and `velocities` (…, 3). A body touches it while it is lower
-/// than `height` (metres) and slower than `speed` (m/s). `window`: an odd number of frames; each value is replaced by the
-/// majority of this many frames around it. The arrays are then (…, frames, bodies, 3), such as those of
-/// `MotionLibrary.sample_windows`, or (frames, 3) for one body; every item of the axes before is filtered alone.
+/// Which bodies touch the ground: bool (…), of `positions` and `velocities` (…, 3). A body touches it while it is
+/// lower than `height` (metres) and slower than `speed` (m/s). `window`: an odd number of frames; each value is
+/// replaced by the majority of this many frames around it. The arrays are then (…, frames, bodies, 3), such as
+/// those of `MotionLibrary.sample_windows`, or (frames, 3) for one body; each item of the other axes is filtered
+/// separately.
 ///
 /// >>> import tumble
 /// >>> tumble.features.contacts([[0.0, 0.0, 0.02]], [[0.1, 0.0, 0.0]], up="z", height=0.05, speed=0.2)

@@ -17,23 +17,38 @@ use crate::run::interruptible;
 
 /// Carries a motion over to another skeleton; returns the clip and a report.
 ///
-/// `target`: a clip with the skeleton. Joints are paired by the parts of the body that their names mean (VRM, Mixamo,
-/// SMPL, LAFAN1, CMU, Xsens, Unreal, SOMA), or by `bones`, a dict of names of the target's joints to those of the
-/// source's. `rest`: "same" if both skeletons rest in the same pose, "directions" to turn the limbs of the target to
-/// the directions of the source's, "auto" to do this only if a direction differs by more than 5 degrees.
-/// `rest_frame`: the index of the key of the source whose pose is its rest pose, such as a T-pose in which takes
-/// begin. `scale`: the factor for the hips' translations: "hips" for the ratio of their heights, "legs" for that of
-/// the lengths of the legs, or a number. `axes`: the rotation x y z w from the axes of the source to those of the
-/// target; by default it is derived from the positions of hips, head and legs.
+/// * `target`: a clip with the skeleton.
+/// * `bones`: the pairs of joints, a dict of names of the target's joints to those of the source's. By default
+///   joints are paired by the parts of the body that their names mean (VRM, Mixamo, SMPL, LAFAN1, CMU, Xsens,
+///   Unreal, SOMA).
+/// * `rest`: "same" if both skeletons rest in the same pose; "directions" to turn the limbs of the target to the
+///   directions of the source's; "auto" to do this only if a direction differs by more than 5 degrees.
+/// * `rest_frame`: the index of the key of the source whose pose is its rest pose, such as a T-pose in which takes
+///   begin.
+/// * `scale`: the factor for the hips' translations: "hips" for the ratio of their heights, "legs" for that of the
+///   lengths of the legs, or a number.
+/// * `axes`: the rotation x y z w from the axes of the source to those of the target; by default it is derived from
+///   the positions of hips, head and legs.
 ///
-/// Rotations away from the rest pose are the same in the world. Times are the source's. Joints without a partner keep
-/// their rest rotations, and translations of joints other than the hips are lost. The report is a dict: `pairs`, `resting`,
-/// `dropped`, `furthest_dropped` (the one of these that rotates furthest from its rest, and the degrees, or None),
-/// `aligned` (degrees by joint), `scale`, `axes`, `axes_assumed`, `dropped_translation`, `largest_difference`
-/// (rad, of rounding), `ends` (how far hands and feet come away from the source's, in heights of the hips), `below_ground`,
-/// `stood_along` (the axis along which an SMPL body stands, if it is found and not y: the motion was rotated to y up; or None),
-/// `rests_along` (the axes along which the body stands in its rest pose and in the motion, if they differ: give
-/// `rest_frame`; or None).
+/// In the world, each joint rotates away from its rest pose as its partner does. Times are those of the source.
+/// Joints without a partner keep their rest rotations; translations of joints other than the hips are lost. The
+/// report is a dict:
+///
+/// * `pairs`, `resting`, `dropped`: the paired joints, the joints of the target without a partner, and those of the
+///   source without one.
+/// * `furthest_dropped`: of the dropped joints, the one that rotates furthest from its rest pose, with the angle in
+///   degrees; or None.
+/// * `aligned`: the angle in degrees by which the rest pose of each joint was aligned.
+/// * `scale`, `axes`, `axes_assumed`: the factor and the rotation that were used, and whether the rotation is only
+///   assumed.
+/// * `dropped_translation`: the largest translation that was lost, in the unit of the source.
+/// * `largest_difference`: caused by rounding, in rad.
+/// * `ends`: the largest distances of hands and feet from those of the source, in heights of the hips.
+/// * `below_ground`: the largest distance of a foot below the lowest joint of the rest pose, in the unit of the target.
+/// * `stood_along`: the axis along which an SMPL body stands, if it was found and is not y (the motion was then
+///   rotated to y up); else None.
+/// * `rests_along`: the axes along which the body stands in its rest pose and in the motion, if these differ (then
+///   give `rest_frame`); else None.
 ///
 /// >>> import tumble
 /// >>> keys = [[[0, 0, 0, 1], [0, 0, 1, 0]], [[0, 0, 0, 1], [0, 0, 0, 1]]]

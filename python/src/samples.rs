@@ -700,7 +700,7 @@ pub(crate) fn weights(value: Option<&Bound<'_, PyAny>>) -> PyResult<Option<Layer
                 "weights: give a list with a number or an array for each layer",
             ));
         }
-        // Arrays of different shapes.
+        // A list of arrays of different shapes cannot become one array.
         Err(_) if value.is_instance_of::<PyList>() || value.is_instance_of::<PyTuple>() => {
             each(value)?
         }

@@ -27,7 +27,7 @@
 //! clear, and searches on them. [`Net`](net::Net) has two methods: a straight line in (u, v), or the shortest route
 //! on facets.
 
-// Tests may use what systems round differently (clippy.toml).
+// Tests may use functions whose last bit differs between systems (clippy.toml).
 #![cfg_attr(test, allow(clippy::disallowed_methods))]
 
 mod edges;

@@ -62,7 +62,7 @@ impl FromStr for By {
 pub struct Route {
     /// The points from the start to the goal, in the unit of the mesh; one point if both are equal.
     pub points: Vec<DVec3>,
-    /// The unit normal of the surface at each point; 0 where the normals of its faces cancel out. `None` if the
+    /// The unit normal of the surface at each point; 0 if the normals of its faces cancel out. `None` if the
     /// surface has only one side.
     pub normals: Option<Vec<DVec3>>,
     /// The length over the surface, in the unit of the mesh.
@@ -139,7 +139,7 @@ impl Route {
         }
         let normals: Option<Vec<DVec3>> = kept.iter().map(|&spot| surface.normal(spot)).collect();
         Self {
-            // A sum of nothing is -0.
+            // `sum()` of no numbers would be -0.
             length: points
                 .windows(2)
                 .map(|pair| pair[0].distance(pair[1]))

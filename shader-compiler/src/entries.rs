@@ -1,13 +1,15 @@
-//! The kernels as Rust, one invocation at a time: another back end of naga's representation, for everything that a
-//! kernel consists of: its entry point, memory, branches, loops and barriers. What the kernels' check expects of a
-//! device, and what tests count, comes from these functions.
+//! The kernels as Rust, one invocation at a time. This is another back end for naga's representation; it handles all
+//! parts of a kernel: the entry point, memory, branches, loops and barriers. The check of kernels compares a device
+//! with these functions, and tests count their operations.
 //!
 //! They are written for clarity, not for speed, and share no arithmetic with [`crate::functions`]. A function is
-//! generic over a `Machine`, which has the memory and says what a number of f32 is. Functions that reach a barrier are
-//! `async`: they yield there until the whole workgroup has arrived; so are those that ask the other lanes of a subgroup.
+//! generic over a `Machine`, which has the memory and the type of numbers. Functions that reach a barrier are `async`:
+//! there they yield until the whole workgroup has arrived. Functions that exchange values with other lanes of a
+//! subgroup are `async`, too.
 //!
-//! Kernels are joined from files that they share. A function is written once for all kernels in which it is the same;
-//! one that is another in some kernels gets a function that asks the machine which kernel runs.
+//! Kernels are joined from files that they share. A function is written once for all kernels in which it is the same.
+//! If functions of one name differ between kernels, a further function asks the machine which kernel runs and calls the
+//! right one.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::fmt::Write as _;
@@ -148,7 +150,7 @@ fn functions<'a>(kernel: &Source<'a>) -> Vec<One<'a>> {
 }
 
 impl One<'_> {
-    /// Its parameters with its result, and the arguments that pass them on.
+    /// The function's parameters with its result as text, and the arguments of a call that passes these parameters on.
     fn signature(&self, types: &Types<'_>) -> (String, String) {
         let ty = |ty| types.name(ty).unwrap_or_default();
         // The arguments of an entry point are provided by the machine.
@@ -284,7 +286,7 @@ fn global(name: Option<&str>) -> String {
     variant(name.unwrap_or_default())
 }
 
-/// The names by which functions are called, and what waits for barriers.
+/// The names by which functions are called, and the functions that wait for barriers.
 struct Names {
     /// The signatures of each name.
     signatures: BTreeMap<String, BTreeSet<String>>,
@@ -450,7 +452,7 @@ impl Types<'_> {
         self.module.types[ty].inner.size(self.module.to_ctx()) / 4
     }
 
-    /// A struct, and how it lies in memory where it can.
+    /// The declaration of a struct, and its layout in memory if it has one.
     fn declaration(&self, ty: Handle<Type>) -> Result<String> {
         let declared = &self.module.types[ty];
         let TypeInner::Struct { members, span } = &declared.inner else {
@@ -782,7 +784,7 @@ impl<'a> Writer<'a> {
         }
     }
 
-    /// A fixed part of what a pointer points to, or an element.
+    /// A field of the value to which a pointer points, or an element of it.
     fn part(
         &mut self,
         base: Handle<Expression>,

@@ -1,5 +1,6 @@
-//! The shaders' arithmetic as Rust: one more back end of naga's representation, for functions that compute values from
-//! values. Rust's operations are the shader's, one by one and in its order, so both round alike. Names of `let` stay.
+//! The shaders' arithmetic as Rust: another back end for naga's representation, for functions that compute values from
+//! values. Each operation of the shader becomes one in Rust, in the same order, so both round in the same way. Names of
+//! `let` are kept.
 //!
 //! A function is written in the first of these forms that its operations allow:
 //! * for any `N: Number`, a number or a vector with the numbers of several samples, or where the list asks for it any
@@ -95,7 +96,7 @@ const BY_HAND: [(&str, &str); 4] = [
 /// stay functions of f32, whose `if` evaluates one side only.
 const CHOOSING: [&str; 2] = ["small_angle_cubic", "rotation_about"];
 
-/// Why a function cannot be written in a form.
+/// A result, or the reason why a function cannot be written in a form.
 pub(crate) type Result<T> = std::result::Result<T, String>;
 
 /// The types of numbers that a function takes.
@@ -110,7 +111,7 @@ enum Numbers {
 /// How a function takes vectors.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Vectors {
-    /// As one number: it treats all components alike.
+    /// The function is written for one number, because it treats all components alike.
     Alike,
     /// As arrays of components.
     Apart,
@@ -121,7 +122,7 @@ enum Vectors {
 struct Shape {
     numbers: Numbers,
     vectors: Vectors,
-    /// Whether any numbers can be compared.
+    /// Whether the numbers, of any type, can be compared.
     chooses: bool,
 }
 
@@ -606,8 +607,8 @@ impl<'a> Writer<'a> {
         )
     }
 
-    /// The function as what comes before a cut and what comes after it. The first part takes the parameters that it
-    /// uses, the second one the others, and what it needs of the first.
+    /// The function in two parts, before and after a cut. The first part takes the parameters that it uses. The second
+    /// part takes the other parameters, and the values of the first part that it needs.
     fn parts(
         &self,
         name: &str,
@@ -781,7 +782,7 @@ impl<'a> Writer<'a> {
         Ok(true)
     }
 
-    /// A block between braces: what gets a name in it has none behind it.
+    /// A block between braces; names that are given inside are not known after it.
     fn inside(&mut self, block: &Block, is_last: bool) -> Result<String> {
         let named = self.named.clone();
         let outside = std::mem::take(&mut self.lines);
@@ -989,7 +990,8 @@ impl<'a> Writer<'a> {
         Err("a vector without this component".to_owned())
     }
 
-    /// A struct, an array, or where components are alike a vector that has one number in all of them.
+    /// A struct, an array, or a vector; if components are treated alike, the vector must have the same number in all
+    /// components.
     fn composed(&mut self, ty: Handle<Type>, components: &[Handle<Expression>]) -> Result<Text> {
         let parts: Result<Vec<String>> = components.iter().map(|&part| self.whole(part)).collect();
         let parts = parts?;
@@ -1226,7 +1228,7 @@ impl<'a> Writer<'a> {
         }
     }
 
-    /// The number in all components, or the only one.
+    /// The number that all components of a vector have, or the number itself.
     fn in_all(&self, handle: Handle<Expression>) -> &'a Expression {
         match &self.function.expressions[handle] {
             Expression::Splat { value, .. } => self.in_all(*value),
@@ -1434,7 +1436,7 @@ pub(crate) fn binary(op: BinaryOperator, is_float: bool, left: Text, right: Text
     })
 }
 
-/// Removes what no later line uses.
+/// Removes lines whose value no later line uses.
 fn prune(lines: &mut Vec<Line>) {
     for i in (0..lines.len()).rev() {
         if let Line::Let(name, _) = &lines[i]

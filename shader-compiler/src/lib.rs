@@ -39,8 +39,8 @@ use table::{CONVERTING_STORE, Kernel, WIDE_STORE};
 /// The engine's package.
 const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
 
-/// Compiles the shaders, writes the files that are not as they should be, each whole or not at all,
-/// and says which.
+/// Compiles the shaders, writes the files whose content differs (each completely or not at all), and prints their
+/// names.
 ///
 /// # Panics
 /// With a message about the shader that cannot be read, is broken or inexact, or declares what
@@ -60,7 +60,7 @@ pub fn write() {
     }
 }
 
-/// The files that are checked in: their paths from the engine's root, and what belongs into them.
+/// The files that are checked in: their paths from the engine's root, and their content.
 type Files = Vec<(&'static str, Vec<u8>)>;
 
 /// Compiles the shaders.
@@ -134,7 +134,7 @@ fn compile() -> Files {
     ];
     let mut hashes = hashes::of_folder(Path::new(ROOT), "shaders").expect("the shaders lie there");
     hashes.retain(|path, _| path.ends_with(".wgsl"));
-    // The engine's build looks at its shaders alone.
+    // The engine's build script checks only the files in `shaders/`.
     let made = (files.iter())
         .filter(|(path, _)| path.starts_with("shaders/"))
         .map(|(path, bytes)| ((*path).to_owned(), hashes::hash(bytes)));
@@ -148,7 +148,7 @@ fn compile() -> Files {
     files
 }
 
-/// The files that are not as they should be, to the byte.
+/// The paths of the files that are missing under `root` or have other bytes there.
 fn stale(root: &Path, files: &Files) -> Vec<&'static str> {
     let stale = files
         .iter()
@@ -307,7 +307,7 @@ impl Module {
         arguments.any(|argument| argument.binding == lane)
     }
 
-    /// Its SPIR-V, which rounds as it is written.
+    /// Its SPIR-V after the exactness pass.
     fn spirv(&self) -> Vec<u32> {
         let Self {
             name,

@@ -84,7 +84,7 @@ fn output(binding: usize) -> String {
 enum Field {
     Scalar(ScalarKind),
     Vector(ScalarKind),
-    /// An array of so many vectors of four f32.
+    /// An array of this many vectors of four f32.
     Vectors(u32),
 }
 
@@ -127,7 +127,7 @@ fn reader(read: &Read, module: &Module, load: impl Fn(&str) -> String) -> String
             load("index / 2u"),
             scalars(&["pair.x", "pair.y"])
         ),
-        // A texel and a half.
+        // A value of 24 bytes takes one and a half texels.
         24 => format!(
             "let texel = (3u * index) / 2u;
              let first = {};

@@ -89,7 +89,7 @@ impl Declared {
         structs.map(|(name, _)| name.clone()).collect()
     }
 
-    /// Constants as Rust, those of the names that are asked for.
+    /// Constants as Rust: those for whose name `is_used` is true.
     pub(crate) fn constants(&self, is_used: impl Fn(&str) -> bool) -> String {
         let mut text = String::new();
         for (name, value) in self.constants.iter().filter(|(name, _)| is_used(name)) {
@@ -230,9 +230,9 @@ pub(crate) struct Compiled {
     /// How it uses the buffer of each binding.
     pub(crate) bindings: Vec<&'static str>,
     pub(crate) words: usize,
-    /// Of its variant that reads texel buffers.
+    /// The length of its variant that reads texel buffers.
     pub(crate) texel_words: Option<usize>,
-    /// Those of the variant that converts to half precision.
+    /// The length of its variant that converts to half precision.
     pub(crate) converting_words: Option<usize>,
     /// Whether the lanes of its subgroups ask each other.
     pub(crate) subgroups: bool,

@@ -37,7 +37,7 @@ pub(crate) struct Kernel {
     pub(crate) has_texels: bool,
     /// Whether it loads elements from storage buffers by vectors of 16 bytes.
     pub(crate) loads_vectors: bool,
-    /// Whether its results go past the caches, so that what it reads stays there.
+    /// Whether its stores bypass the caches, so that the data that it reads stays there.
     pub(crate) streams_results: bool,
     /// Whether it has a variant that converts to half precision as the device does.
     pub(crate) converts: bool,
@@ -276,7 +276,7 @@ const COMPACT_CHANNELS: [&str; 13] = [
     "crowd/compact",
 ];
 
-/// The same where it is simple, beside a file with the curves of translations and scales.
+/// The files for one layer of arcs, without a branch, in addition to a file with the curves of translations and scales.
 const PLAIN_CHANNELS: [&str; 7] = [
     "math/canonical",
     "math/sine_cosine",
@@ -295,8 +295,7 @@ static CROWD_READS: [Read; 4] = [
     read("positions", "CrowdPosition", "position_at"),
 ];
 
-/// Kernels that evaluate the joints of a crowd, each with the files that it needs behind some that
-/// it shares.
+/// Kernels that evaluate the joints of a crowd, each with the files that it needs in addition to the shared ones.
 const CROWD_JOINTS: [(&str, &[&str], &[&str]); 6] = [
     ("rotations", &CHANNELS, &["crowd/layers", "crowd/rotations"]),
     (
@@ -410,7 +409,7 @@ const WHOLE: [&str; 8] = [
     "crowd/whole",
 ];
 
-/// Files of those that evaluate matrices.
+/// Files of the crowd kernels that evaluate matrices.
 const WHOLE_MATRICES: [&str; 5] = [
     "math/matrix",
     "crowd/transform",
@@ -462,7 +461,7 @@ const CROWD_SUBGROUPS: [&str; 9] = [
     "crowd/ticks",
 ];
 
-/// Each with the files that store.
+/// The kernels over subgroups, each with the files that store its results.
 const CROWD_SUBGROUP_STORES: [(&str, &[&str]); 2] = [
     ("subgroup_rotations", &["stores/f32"]),
     ("subgroup_rotations_f16", &["math/half", "stores/f16"]),

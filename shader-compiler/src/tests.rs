@@ -149,7 +149,7 @@ fn functions_are_written_for_as_many_numbers_as_their_operations_allow() {
     }
 }
 
-/// Values that are computed before the cut are not computed again behind it.
+/// Values that are computed before the cut are not computed again after it.
 #[test]
 fn functions_with_a_cut_are_written_in_two_parts() {
     let source = "fn polynomial(c: array<vec4f, 11>, s: f32) -> vec4f {

@@ -442,8 +442,8 @@ mod tests {
         changed
     }
 
-    /// Catches a limit that is too low: a component whose terms cancel would keep what
-    /// other devices put to zero.
+    /// Catches a limit that is too low: then a component whose terms cancel would keep a tiny value that other devices
+    /// replace by 0.
     #[test]
     fn segments_that_say_so_have_no_tiny_components() {
         let random = &mut Rng::with_seed(1);

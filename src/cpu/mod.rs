@@ -1,9 +1,8 @@
 //! The CPU: the shaders' arithmetic in vector lanes, on all threads, with the bits of every Vulkan device.
 //!
-//! Evaluating a sample takes a few nanoseconds, less than loading its segment from memory or storing the sample
-//! there. Therefore a thread prepares about a thousand keys, evaluates them while their segments are in its cache,
-//! and drops them; long results bypass the caches; and the samples of a run, which share a segment, fill the lanes of
-//! a vector.
+//! Evaluating a sample takes a few nanoseconds, less than loading its segment from memory or storing the sample there.
+//! Therefore a thread prepares about a thousand keys, evaluates them while their segments are in its cache, and drops
+//! them. Long results bypass the caches. The samples of a run, which share a segment, fill the lanes of a vector.
 //!
 //! # Types
 //!
@@ -20,10 +19,10 @@
 //!
 //! | in [`engine`] | for | what is prepared |
 //! |---|---|---|
-//! | `evaluate_batches` | sets | batch by batch, evaluated at once and forgotten |
-//! | `clip` | clips, and frame by frame | everything, before |
+//! | `evaluate_batches` | sets | each batch, which is evaluated at once and then dropped |
+//! | `clip` | clips, and frame-major results | everything, before the evaluation |
 //! | `sparse_samples` | far fewer samples than keys | the intervals with a sample |
-//! | `from_keys` | fewer than eight samples for a key, arcs and cubics of small angles | nothing; intervals whose angles turn out too large are prepared alone |
+//! | `from_keys` | fewer than eight samples for a key, arcs and cubics of small angles | nothing, except for intervals whose angles are found to be too large |
 //!
 //! All but the last use `CpuEngine::part`, which evaluates a [`Row`](row::Row): the intervals of a part are processed
 //! in blocks, each with its samples, and every run is evaluated when it is found ([`evaluate`]). Samples at listed

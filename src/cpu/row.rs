@@ -71,9 +71,9 @@ impl<I: SegmentList + ?Sized, O: Samples + ?Sized> InLanesInto<I, O> for Row<'_>
 }
 
 impl Row<'_> {
-    /// Evaluates the frames between the keys of the track itself (not of a repeated copy), without a list of runs;
-    /// nearly every sample is evaluated so. Returns false if a distance from a segment's middle is not an integer
-    /// that f32 has; then the caller evaluates all samples by runs.
+    /// Evaluates the frames between the keys of the track itself (not of a repeated copy), without a list of runs.
+    /// Nearly all samples are such frames. Returns false if a distance from a segment's middle is not an integer that
+    /// f32 has; then the caller evaluates all samples by runs.
     #[inline(always)]
     fn spans<L: Lanes, I: SegmentList + ?Sized, O: Samples + ?Sized>(
         &self,

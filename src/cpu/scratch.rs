@@ -122,7 +122,7 @@ mod tests {
         assert_eq!(pool.kept().unwrap().len(), KEPT_EACH * threads::count());
     }
 
-    /// As in a process that was forked while another thread had the pool.
+    /// The case of a process that was forked while another thread had locked the pool.
     #[test]
     fn a_pool_that_stays_locked_is_done_without() {
         let pool = ScratchPool::default();

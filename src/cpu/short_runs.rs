@@ -1,7 +1,7 @@
-//! Rows of kept clips with few samples between keys, as keys at 30 Hz have at 60 frames a second. The samples of such a
-//! row, their intervals and parameters, are found once for all tracks in succession with the same key times: to find
-//! them takes longer than to evaluate them. Arcs are computed from their keys again, in a lane for each interval, which
-//! takes less time than to read them from memory.
+//! Rows of kept clips with few samples between keys, for example keys at 30 Hz that are evaluated at 60 frames a
+//! second. Finding the interval and the parameter of each sample takes longer than evaluating it. Therefore this is
+//! done once for all consecutive tracks with the same key times. Arcs are computed again from their keys, with a lane
+//! for each interval, because reading their segments from memory would take longer.
 
 use std::ops::Range;
 
@@ -28,7 +28,8 @@ pub(crate) struct ShortRuns<'a> {
     clock: FrameClock,
     samples: Range<usize>,
     width: VectorWidth,
-    /// The tracks for which samples were found, of [`ClipData::time_classes`].
+    /// The number in [`ClipData::time_classes`] of the tracks for which `plan` is: other tracks with the same number
+    /// use it, too.
     class: u32,
     frames: FramePlan<'static>,
     plan: IntervalPlan,
@@ -67,7 +68,7 @@ impl<'a> ShortRuns<'a> {
         })
     }
 
-    /// Evaluates the samples of a track; returns whether it can be evaluated so.
+    /// Evaluates the samples of a track; returns false if the track must be evaluated by the general path.
     pub(crate) fn row(&mut self, track: usize, output: &mut [[f32; 4]]) -> bool {
         let class = self.clip.time_classes()[track];
         let Some(PartRef { prepared, part }) = self.clip.only_part(track) else {
@@ -114,7 +115,7 @@ impl<'a> ShortRuns<'a> {
 /// Evaluates samples of polynomials one by one, all of a segment in succession.
 struct Polynomials<'a> {
     plan: &'a IntervalPlan,
-    /// Of each interval.
+    /// The source of each interval.
     sources: &'a [StoredSource],
 }
 

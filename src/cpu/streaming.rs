@@ -14,8 +14,8 @@ use crate::simd::lanes::Lanes;
 use crate::time::runs::Affine;
 use crate::twin::Evaluate;
 
-/// The minimum size in bytes of a result for streaming stores: the caches would contain so little of it that its reader
-/// does not benefit.
+/// The minimum size in bytes of a result for streaming stores. Of such a result, the caches could keep so little that
+/// its reader would not benefit.
 const LONG: usize = 32 << 20;
 
 /// The minimum number of samples of a row for which streaming stores save more time than staging takes.
@@ -36,7 +36,7 @@ pub(crate) struct Stage<'o> {
 
 /// The destination of consecutive rows in an encoding.
 pub(crate) enum RowStage<'o> {
-    /// As four f32 per value.
+    /// Values of four f32, for which rows may be staged.
     Values(Stage<'o>),
     Encoded(EncodedStage<'o>),
 }
@@ -337,7 +337,7 @@ impl Samples for Staged<'_, '_> {
         let (line, end) = (staged_start / EACH, staged_start + count);
         let is_next = self.made == staged_start;
         if is_next && count > SAMPLES_ONE_BY_ONE && end / EACH < LINES {
-            // First the staged lines before these samples.
+            // The lines that were staged before these samples are stored first.
             self.destination.store::<L>(&self.lines[..line]);
             if self.destination.before.is_empty() {
                 let streaming_lines = StreamingLines {

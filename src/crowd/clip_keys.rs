@@ -1,7 +1,8 @@
-//! Curves of motion tables that are kept as their keys, where these determine them: the arcs of slerp and straight
-//! lines. What a sample needs of them is computed when it is taken, so that a key takes 16 bytes instead of 48 for
-//! rotations, 16 instead of 80 for translations, and 8 if rotations are packed. Only the kernels for
-//! states of motion read these forms (`shaders/motion/joints.wgsl`, with `shaders/motion/packed.wgsl`).
+//! Curves of motion tables that are stored as keys instead of segments. This is possible if the keys determine the
+//! curve: for the arcs of slerp and for straight lines. The constants of the curve are computed again for each sample.
+//! A key then takes 16 bytes instead of 48 for rotations (8 if rotations are packed), and 16 instead of 80 for
+//! translations. Only the kernels for states of motion read these forms (`shaders/motion/joints.wgsl`, with
+//! `shaders/motion/packed.wgsl`).
 
 use glam::Vec4;
 

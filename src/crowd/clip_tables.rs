@@ -235,8 +235,8 @@ fn of_keys(curve: ChannelCurve, precision: KeyPrecision) -> ChannelCurve {
     }
 }
 
-/// The curve of the only track, whose arcs are listed, as its keys; `None` if these do not determine it: some arc does not
-/// lie between the keys as they are stored, or is not followed by the one that begins where it ends.
+/// The curve of the only track, whose arcs are listed, stored as the track's keys. `None` if the keys do not determine
+/// the curve: an arc is not the one between the stored keys, or the next arc does not begin where it ends.
 fn curve_of_keys(
     data: &ClipData,
     clock: (FrameRate, FrameStart, u32),
@@ -400,7 +400,7 @@ impl ClipTables {
         clock: (FrameRate, FrameStart, u32),
     ) -> Result<Vec<ChannelCurve>, CrowdError> {
         let joints = 0..set.track_count();
-        // Where keys are enough, no arc is computed.
+        // If the tables can store keys, the arcs between them are not computed.
         let are_from_keys = form == FORM_ARC
             && interpolation.signs == KeySigns::Shortest
             && interpolation.speed == Speed::AsKeyed;

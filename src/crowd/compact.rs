@@ -1,7 +1,8 @@
-//! Clips of crowds that are stored compactly: keys, where these determine the curves between them, and segments without the
-//! powers that are 0 for the other intervals. A key of a rotation takes 16 bytes (slerp) or 20 to about 48 (smooth
-//! methods) instead of 48 or 192. What a sample needs of the keys is computed when it is taken, with the operations that
-//! prepare segments, so that every bit is the same; each curve is compared when it is stored.
+//! Clips of crowds that are stored compactly. If the keys determine the curve of an interval, only the keys are stored;
+//! for other intervals a segment is stored, without the powers that are 0. A key of a rotation takes 16 bytes (slerp)
+//! or 20 to about 48 (smooth methods) instead of 48 or 192. The constants of a curve are computed from the keys for
+//! each sample, with the operations that prepare segments, so that every bit is the same. Each curve is compared when
+//! it is stored.
 
 use bytemuck::Zeroable as _;
 
@@ -37,8 +38,9 @@ pub enum CrowdStorage {
     /// take the least time.
     #[default]
     Segments,
-    /// As keys where these determine the curves, and as shortened segments where they do not: 16 to 20 bytes by slerp, and
-    /// 20 to 48 by Catmull-Rom and Bessel-Overhauser for motion whose keys are close. Poses take longer.
+    /// As keys if these determine the curve of an interval, otherwise as shortened segments. A key of a rotation takes
+    /// 16 to 20 bytes by slerp, and 20 to 48 by Catmull-Rom and Bessel-Overhauser if the keys of the motion are close.
+    /// Poses take longer.
     Compact,
 }
 
@@ -48,7 +50,7 @@ names! {
     Compact => "compact",
 }
 
-/// The largest number of cells of a clip's compact cubics: behind them, no source has room for a segment's place.
+/// The largest number of cells of a clip's compact cubics: a source has no bits for the index of a segment after them.
 const MAX_CUBIC_CELLS: usize = SOURCE_BITS as usize >> 2;
 
 /// The keys of a track of rotations, from which its curve may follow.
@@ -81,9 +83,9 @@ impl<'a> KeysOfTrack<'a> {
     }
 }
 
-/// The key in a row, of those at the starts of the spans and the one at the end.
+/// The key of a row. There is a row for the start of each span, and one for the end of the last span.
 struct RowKey {
-    /// As cells have it: four times as long where its authored sign is the other one.
+    /// The key as cells store it: multiplied by 4 if it was added with the opposite sign.
     stored: [f32; 4],
     weights: TangentWeights,
 }
@@ -100,8 +102,8 @@ struct CompactCubic {
     segments: Vec<(usize, PolynomialSegment)>,
 }
 
-/// Replaces the constants of a clip's rotations by their keys where these determine enough of them. There is a rotation for
-/// each track of the set.
+/// Replaces the constants of a clip's rotations by their keys, for curves that take less memory in this way. There is a
+/// rotation for each track of the set.
 pub(crate) fn compact_rotations(
     rotations: &mut [&mut ChannelCurve],
     set: &TrackSet,

@@ -120,7 +120,7 @@ impl fmt::Debug for DeviceBodies {
     }
 }
 
-/// The words of an instance's states that an array has.
+/// The 32-bit words of an instance's states of which an array consists, by their indices.
 fn picks(array: BodyArray, frames: &TreeFrames) -> Vec<u32> {
     let state = STATE_VECTORS * VECTOR_WORDS;
     let vectors = |list: &[u32], vector: u32, components: &[u32]| {

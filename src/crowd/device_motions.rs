@@ -156,7 +156,7 @@ pub(super) fn resident(
     Ok(ResidentMotions::new(opened.engine(), &source)?)
 }
 
-/// Runs work on the instances of a call, of so many clips.
+/// Runs work on the instances of a call; there are `clips` clips.
 pub(super) fn with_request<T>(
     clips: usize,
     (at, steps): (&[(u32, u32)], Option<&[FrameStep]>),

@@ -87,7 +87,8 @@ impl Passages {
                 None => (at, 1, i128::from(before < at && at <= position)),
                 Some(round) => {
                     let round = round << 16;
-                    // The first of at + k round that is greater than `before`, and how many are up to `position`.
+                    // The crossings are at `at + k * round`: the first one after `before`, and the number of them up to
+                    // `position`.
                     let first = at + ((before - at).div_euclid(round) + 1) * round;
                     (first, round, (position - first).div_euclid(round) + 1)
                 }

@@ -85,7 +85,7 @@ impl Instances {
                     continue;
                 }
                 let layer = CrowdLayer::moved(&old, clips, self.clock, clock);
-                // These values were packed before, so packing them again cannot fail.
+                // Packing cannot fail here, because the same values were packed before.
                 if let Ok(mut entry) = layer.packed(clips, masks, clock) {
                     entry.clip_and_weight = old.clip_and_weight;
                     self.set(index, entry);
@@ -206,7 +206,7 @@ mod tests {
     use super::*;
     use crate::twin::crowd_entries::scatter;
 
-    /// Applies a frame as a device does; the bytes that it takes for it.
+    /// Applies a frame as a device does, and returns the number of bytes that are uploaded for it.
     fn applied(all: &mut Instances, known: &mut [CrowdEntry]) -> usize {
         match all.take_frame(2).changes {
             EntryChanges::None => 0,

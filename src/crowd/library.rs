@@ -26,8 +26,8 @@ use crate::tracks::joints::Joints;
 use crate::tracks::set::TrackSet;
 use crate::twin::crowd_matrices::Rows;
 
-/// The default number of ticks in a second: a frame of 24, 25, 30, 48, 50, 60, 90, 100, 120, 144, 240 or 360 Hz and a
-/// sample of 44.1 kHz last a whole number of ticks.
+/// The default number of ticks in a second. With it, a frame of 24, 25, 30, 48, 50, 60, 90, 100, 120, 144, 240 or 360
+/// Hz lasts a whole number of ticks, and so does a sample of 44.1 kHz.
 const TICKS_PER_SECOND: u32 = 705_600;
 
 /// The clips, masks and inverse bind matrices of one skeleton, prepared for crowds.
@@ -564,12 +564,13 @@ impl MotionBuilder {
         self.0.push_tables(set, interpolation.into(), vectors)
     }
 
-    /// Adds so many clips in this order, which are made by `clip` and prepared on the threads of `engine`. Each is dropped as
-    /// soon as it is prepared.
+    /// Adds `count` clips, in the order of their indices. `clip` makes the clip of an index; the clips are prepared on
+    /// the threads of `engine`, and each is dropped as soon as it is prepared.
     ///
     /// # Errors
-    /// The index of a clip and why it is not added, which is the error of `clip` or as [`MotionBuilder::push`]; clips before
-    /// it are added. When the system refuses threads or the work is stopped, the index is that of the next clip.
+    /// The index of the first clip that cannot be added, and the reason: the error of `clip`, or an error as of
+    /// [`MotionBuilder::push`]. The clips before it are added. When the system refuses threads or the work is stopped,
+    /// the index is that of the next clip.
     pub fn push_all<'a, E: From<CrowdError> + Send>(
         &mut self,
         engine: &Engine,

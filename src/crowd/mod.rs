@@ -21,8 +21,8 @@
 //! # Steps
 //!
 //! 1. [`Crowd::set`] packs a layer into its entry and marks the entry as changed.
-//! 2. An evaluation computes, for each layer of each instance, its tick, and from the tick its position among the key
-//!    times of the clip (a *time base* is a list of key times that channels share).
+//! 2. For each layer of each instance, an evaluation computes the tick of the clip, and from it the position among the
+//!    key times of each *time base*: a list of key times that channels share.
 //! 3. It evaluates the rotation, translation and scale of each joint in the lowest layer and blends the other layers
 //!    over it.
 //! 4. For matrices in the model it multiplies along the skeleton, level by level, and for skinning matrices also by
@@ -33,16 +33,16 @@
 
 // Inside
 //
-// A library's clips are flat tables (`clip_tables`): per clip its time bases, per time base its spans, per joint a
-// rotation, a translation and a scale, each with a form and cells of four numbers. Each layer of an instance is an
-// entry of 16 bytes (`instances`); weights that fade are written into it as the clock moves (`fade`). Positions are
-// found by `twin::crowd_times`; layers are laid over each other by `lay_over` and `twin::crowd_layers`; `gpu::crowd`
-// runs the kernels, `on_cpu` their twins.
+// The clips of a library are flat tables (`clip_tables`). A clip has time bases, and a time base has spans. Each joint
+// of a clip has a rotation, a translation and a scale; each of these has a form and cells of four numbers. Each layer
+// of an instance is an entry of 16 bytes (`instances`); weights that fade are written into it as the clock moves
+// (`fade`). Positions are found by `twin::crowd_times`; layers are laid over each other by `lay_over` and
+// `twin::crowd_layers`; `gpu::crowd` runs the kernels, `on_cpu` their twins.
 //
-// Cells of channels with one form and one time base lie side by side, constant by constant, so that neighbouring
-// joints are neighbouring lanes. Motion tables keep the keys of arcs and lines instead (`clip_keys`), and crowds those of
-// cubics too if this is requested (`compact`). On a device the tables stay; entries that changed are written with the next
-// evaluation; positions live for a window alone.
+// If channels have the same form and time base, their cells are stored side by side, constant by constant, so that
+// neighbouring joints are neighbouring lanes. Motion tables store keys instead of segments for arcs and lines
+// (`clip_keys`); crowds do so for cubics too if this is requested (`compact`). A device keeps the tables. Entries that
+// changed are written to it with the next evaluation. Positions are kept only while a window is evaluated.
 
 pub(crate) mod body_states;
 pub(crate) mod channel_curve;

@@ -219,7 +219,8 @@ impl MotionTables {
             && self.clips.iter().enumerate().all(is_sound_clip)
     }
 
-    /// The tables of some clips alone, each once, in this order, with their spans and cells. They give the same states.
+    /// Makes tables that have only some of the clips, in this order, with their spans and cells. They give the same
+    /// states.
     ///
     /// # Errors
     /// * When a clip does not exist or is listed twice.
@@ -742,12 +743,13 @@ pub(super) fn canonical3<N: Number>([x, y, z]: [N; 3]) -> [N; 3] {
 }
 
 impl<N: Number> Joint<N> {
-    /// The joint's state in the world, of that in its parent's frame.
+    /// Converts the joint's state from its parent's frame to the world; `parent` is the parent's state in the world.
     #[inline(always)]
     pub(super) fn hung_on(self, parent: &Self, moves: bool) -> Self {
         let arm = rotated(parent.rotation, self.position);
         let rotation = product(parent.rotation, self.rotation);
-        // One step of Newton's: rounding does not add up along the skeleton.
+        // One step of Newton's method normalises the rotation, so that rounding errors do not add up along the
+        // skeleton.
         let scale = N::all(1.5) - N::all(0.5) * dot(rotation, rotation);
         let [x, y, z, w] = rotation;
         let mut found = Self {
@@ -783,7 +785,7 @@ struct StatesTask<'a, 'b> {
     memory: &'b mut StateScratch,
 }
 
-/// Which values of a pose are computed.
+/// The values of a pose that are computed.
 #[derive(Clone, Copy, PartialEq, PartialOrd)]
 pub(super) enum PoseValues {
     /// Rotations in the parents' frames.
@@ -1033,7 +1035,7 @@ fn guessed_position(
     for _ in 0..GUESSES {
         let (first, end) = neighbours(index, count);
         let neighbours = &base_spans[first..end];
-        // All are compared, because branches could not be predicted.
+        // All starts are compared without branches, because the processor could not predict these.
         let is_begun = |span: &CrowdSpan| usize::from(span.start & TICKS <= tick);
         let begun: usize = neighbours.iter().map(is_begun).sum();
         let is_found = begun > 0 && (begun < neighbours.len() || first + begun == count);

@@ -264,7 +264,7 @@ pub(crate) fn quantity_value<R: Real>(
     let body = [clamped(twice * x), clamped(twice * y), clamped(twice * z)];
     let [x, y, z] = match axes {
         Axes::Body => body,
-        // This holds for accelerations too: ω × ω = 0.
+        // Accelerations are rotated in the same way, because the additional term ω × ω is 0.
         Axes::Parent => rotated(at, body),
     };
     [x, y, z, R::all(0.0)]

@@ -28,7 +28,7 @@ impl Engine {
         handles: VulkanHandles,
         options: &EngineOptions,
     ) -> Result<Self, Error> {
-        // SAFETY: promised by the caller.
+        // SAFETY: as the caller promises.
         let engine = unsafe { VulkanEngine::from_handles(handles, options) }?;
         Ok(Self {
             machine: Arc::new(Opened::trusted(engine, options)?),

@@ -1,6 +1,6 @@
-//! Sets whose tracks have several interpolations: tracks with equal ones are evaluated together, and their values are
-//! copied to where they belong among those of all tracks. Each group is evaluated as a set of its own, so that a
-//! track's values do not depend on its neighbours, and has its [`Plan`].
+//! Sets whose tracks have several interpolations. Tracks with equal interpolations are a group. Each group has its
+//! [`Plan`] and is evaluated as a separate set, so that a track's values do not depend on its neighbours. Then the
+//! values are copied to the positions of the tracks in the whole result.
 
 use std::borrow::Cow;
 use std::ops::Range;

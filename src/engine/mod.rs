@@ -246,9 +246,9 @@ impl Engine {
     /// a clip.
     ///
     /// On the CPU, a clip whose segments would exceed [`EngineOptions::kept_segments`] or [`EngineOptions::memory`]
-    /// keeps its keys instead, if samples can be computed from them ([`Clip::bytes_per_key`]). If the prepared tracks
-    /// of an interpolation would take more than [`EngineOptions::memory`] in either form, the clip keeps the set, and
-    /// each evaluation prepares it piece by piece, which is slower and gives the same bits.
+    /// keeps its keys instead, if samples can be computed from them ([`Clip::bytes_per_key`]). If both segments and
+    /// keys would take more than [`EngineOptions::memory`], the clip keeps the set. Each evaluation then prepares the
+    /// set piece by piece, which is slower and gives the same bits.
     ///
     /// # Errors
     /// * When a track cannot be interpolated as requested.

@@ -57,7 +57,7 @@ pub(crate) fn fill(
     }
 }
 
-/// Evaluates a request in rows, and copies them into frames if the result is to be so.
+/// Evaluates a request in rows, and copies them into frames if the result is frame by frame.
 #[cfg(not(smallest))]
 fn fill_rows(
     machine: &Arc<dyn Machine>,
@@ -102,7 +102,8 @@ fn evaluate_rows(
     machine.rows(request, rows, output)
 }
 
-/// Refuses what cannot be interpolated as requested; keys that no sample needs are refused too, on every route.
+/// Refuses tracks that cannot be interpolated as requested. All routes also refuse keys that no sample needs, so that
+/// they report the same errors.
 fn check(request: &SetRequest<'_>) -> Result<(), SetError> {
     match request.len() == 0 || matches!(request.batch(), Batch::Span { .. }) {
         true => Ok(request.check()?),

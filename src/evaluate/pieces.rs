@@ -192,7 +192,7 @@ impl PreparedWindow {
     }
 
     /// All tracks at all samples of the request from which it was prepared, if those are all samples of its timeline:
-    /// the result stays in memory of the device where that saves a copy.
+    /// the result stays in memory of the device if this saves a copy.
     pub(crate) fn evaluate(&self, layout: Layout) -> Result<Box<dyn Storage>, EvaluateError> {
         let done = self.clip.evaluate(&self.timeline, layout);
         done.map_err(|error| error.of_tracks_from(self.first_track))

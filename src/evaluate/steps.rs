@@ -17,7 +17,7 @@ pub(crate) enum Step {
     Piece,
 }
 
-/// Tests run at the same time: the notes of each engine are its own, by the address of its machine.
+/// The steps of all engines, each with the address of the engine's machine, because tests run at the same time.
 static NOTES: Mutex<Vec<(usize, Step)>> = Mutex::new(Vec::new());
 
 fn address_of(machine: &dyn Machine) -> usize {

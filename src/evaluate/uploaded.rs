@@ -95,7 +95,7 @@ impl Uploaded {
         Ok(Self::Prepared(clip))
     }
 
-    /// A set that every evaluation prepares anew; refuses what cannot be interpolated.
+    /// A set that every evaluation prepares again; tracks that cannot be interpolated are refused.
     pub(crate) fn of_set(
         set: TrackSet,
         interpolation: Interpolation,

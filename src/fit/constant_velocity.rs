@@ -34,7 +34,7 @@ pub(crate) fn arc_component<N: Number>(middle: N, tangent: N, square: N) -> [N; 
 pub(crate) fn arc_polynomial([from, to]: [[f32; 4]; 2]) -> PolynomialSegment {
     let (middle, tangent) = arc_between(from, to);
     let square = Vec4::splat(norm_squared(tangent));
-    // All four components at once.
+    // Each vector has all four components, so one call computes the coefficients of all.
     let powers = arc_component(Vec4::from_array(middle), Vec4::from_array(tangent), square);
     PolynomialSegment {
         coefficients: powers.map(|power| power.to_array()),

@@ -45,7 +45,7 @@ impl InLanes for CubicBlock {
             );
             let is_held = L::load(&self.held[j..]).equals(L::all(1.0));
             let found = sample(&curve, L::load(&self.parameters[j..]));
-            // Written out: closures are not always inlined.
+            // Written out without a closure, because closures are not always inlined.
             let found = [
                 L::choose(is_held, start[0], found[0]),
                 L::choose(is_held, start[1], found[1]),

@@ -1,7 +1,7 @@
-//! Frames of a track straight from its keys: a lane for each interval between two keys that contains samples. The
-//! curve of an interval is made once for all of its samples, and stays in registers while these are evaluated and
-//! stored. Which samples an interval has, their parameters and the weights of tangents depend on key times alone, and
-//! are kept for the following tracks with the same times.
+//! Frames of a track, computed directly from its keys: there is a lane for each interval between two keys that contains
+//! samples. The curve of an interval is made once for all of its samples, and stays in registers while these are
+//! evaluated and stored. The samples of an interval, their parameters and the weights of tangents depend only on the
+//! key times. Therefore they are kept for the following tracks with the same times.
 
 use std::ops::Range;
 
@@ -15,8 +15,8 @@ use crate::twin::arc_between::arc_between;
 use crate::twin::evaluate_arc::{norm_squared, on_arc};
 use crate::twin::small_angle::{SmallAngleCubic, small_angle_cubic};
 
-/// The maximum number of samples of a lane; the others of a longer interval are in further lanes, so that all lanes
-/// have about as many.
+/// The maximum number of samples of a lane. An interval with more samples takes several lanes, so that all lanes have
+/// about the same number.
 const SAMPLES: usize = 8;
 
 /// With fewer lanes most of a vector would be unused; then the samples of several tracks share vectors.
@@ -196,7 +196,7 @@ impl IntervalLanes {
         }
     }
 
-    /// Sets what follows from all lanes.
+    /// Sets the fields that are computed from all lanes.
     fn finish(&mut self, curve: KeyCurve) {
         let beside = curve.beside();
         let is_in_order = |keys: &[u32; MAX_LANES]| {
@@ -345,7 +345,7 @@ impl VectorAt<'_> {
         ]
     }
 
-    /// The parameter of each interval's sample `i`; any where it has fewer.
+    /// The parameter of each interval's sample `i`; any number for intervals with fewer samples.
     #[inline(always)]
     fn parameters<L: Lanes>(self, plan: &IntervalPlan, i: usize) -> L {
         let i = i.min(self.lanes.max_count - 1);
@@ -453,7 +453,8 @@ mod tests {
             let clip = engine.upload(set, method).unwrap();
             let timeline = frames.resolve(set.track_count(), set.time_span()).unwrap();
             let count = timeline.len();
-            // So few samples at once are evaluated one by one, each from its segment.
+            // The expected samples are requested three at a time: so few samples are evaluated one by one, each from
+            // its segment.
             let mut expected = vec![[0.0; 4]; set.track_count() * count];
             for first in (0..count).step_by(3) {
                 let some = first..count.min(first + 3);

@@ -1,5 +1,5 @@
-//! Clips that keep keys instead of segments: 16 bytes per key, and segments for the few intervals that the series of
-//! small angles does not hold. A segment takes 176 bytes, and samples at one time read one for each track.
+//! Clips that keep keys instead of segments: 16 bytes per key, and segments for the few intervals that rotate too far
+//! for the series of small angles. A segment takes 176 bytes, and a pose reads a segment of each track.
 
 use bytemuck::Zeroable;
 
@@ -36,7 +36,7 @@ pub(crate) struct KeptKeys {
     rest: Rest,
 }
 
-/// The curves of the intervals that the series does not hold, in order of tracks and time.
+/// The curves of the intervals that rotate too far for the series, in the order of tracks and time.
 struct Rest {
     /// The index of each track's first span, and the number of all spans.
     tracks: Vec<usize>,
@@ -68,7 +68,8 @@ const REST_BYTES: usize =
     size_of::<PolynomialSegment>() + size_of::<f64>() + size_of::<StoredSource>();
 
 impl KeptKeys {
-    /// Keeps the keys of a set if its curves can be computed from them, in at most so many bytes; `None` otherwise.
+    /// Keeps the keys of a set if its curves can be computed from them, and if all takes at most `bytes` bytes; `None`
+    /// otherwise.
     pub(crate) fn new(
         set: &TrackSet,
         interpolation: Interpolation,
@@ -96,7 +97,7 @@ impl KeptKeys {
             data,
             curve,
         };
-        // An interval that was cut has several segments.
+        // The size is known only now: an interval that was divided has several segments.
         Ok((kept.bytes() <= bytes).then_some(kept))
     }
 
@@ -155,7 +156,7 @@ impl KeptKeys {
         }
     }
 
-    /// Evaluates the rotations that the series does not hold.
+    /// Evaluates the rotations in intervals that rotate too far for the series.
     #[cold]
     #[inline(never)]
     fn resolve(&self, at: &TimeBetweenKeys, tracks: &TracksInLanes, output: &mut [[f32; 4]]) {
@@ -242,7 +243,7 @@ impl<L: Lanes> KeysOf<Together<L, 2>> for [TracksInLanes; 2] {
     }
 }
 
-/// The same weights in all lanes.
+/// Weights that are the same in all lanes.
 #[inline(always)]
 pub(crate) fn alike<L: Lanes>(weights: TangentWeights) -> [L; 4] {
     let TangentWeights {

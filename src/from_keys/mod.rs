@@ -86,9 +86,9 @@ fn has_small_steps(set: &TrackSet) -> bool {
     3 * small > 2 * probes
 }
 
-/// Whether the small-angle series holds for nearly all curves between keys, if the tangents are means of steps. Each of the
-/// others is prepared, with its neighbours, which takes several times as long as the series; and their samples are
-/// evaluated twice, which counts where a key has several.
+/// Whether nearly all curves between keys rotate so little that the small-angle series can be used, if the tangents are
+/// means of steps. Each of the other curves must be prepared, with its neighbours, which takes several times as long as
+/// the series; and its samples are evaluated twice, which matters if a key has several samples.
 fn has_small_curves(set: &TrackSet, samples_of_a_key: usize) -> bool {
     let is_small = |steps: [Vec4; 3]| {
         let [before, step, after] = steps;

@@ -140,7 +140,7 @@ impl Buffer {
         Ok(buffer)
     }
 
-    /// Imports pages of this process's memory; `None` where the device cannot.
+    /// Imports pages of this process's memory; `None` if the device cannot.
     ///
     /// # Safety
     /// The pages must stay allocated until the buffer is dropped and no submitted work uses it.
@@ -152,7 +152,7 @@ impl Buffer {
         let borrows = device.borrows.as_ref()?;
         let pages = pages.as_ptr().cast();
         let mut properties = vk::MemoryHostPointerPropertiesEXT::default();
-        // SAFETY: the extension is enabled, and the pages are there.
+        // SAFETY: the extension is enabled, and the pages belong to this process.
         let known = unsafe {
             let call = borrows.fp().get_memory_host_pointer_properties_ext;
             call(
@@ -178,7 +178,7 @@ impl Buffer {
             .allocation_size(size)
             .memory_type_index(memory_type)
             .push_next(&mut import);
-        // SAFETY: a valid size and memory type, and the pages are there.
+        // SAFETY: a valid size and memory type, and the pages belong to this process.
         let memory = unsafe { device.raw.allocate_memory(&info, None) }.ok()?;
         let memory = Share {
             memory,

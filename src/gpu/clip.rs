@@ -285,7 +285,7 @@ impl ClipTarget {
         commands: vk::CommandBuffer,
         offset: u64,
     ) -> Result<(), VulkanError> {
-        // SAFETY: promised by the caller.
+        // SAFETY: as the caller promises.
         unsafe { self.record_between(commands, offset, CommandScopes::default()) }
     }
 
@@ -305,7 +305,7 @@ impl ClipTarget {
         scopes: CommandScopes,
     ) -> Result<(), VulkanError> {
         let first = self.range.first(offset)?;
-        // SAFETY: promised by the caller.
+        // SAFETY: as the caller promises.
         let commands = unsafe { Commands::new(&self.engine.device, commands) };
         let mut work = lock(&self.work);
         self.fill(&mut work, first);

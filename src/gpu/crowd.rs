@@ -168,8 +168,8 @@ pub struct CrowdTarget {
     evaluation: Evaluation,
     /// The recording of a frame, which the next frame fills again.
     work: Mutex<Recorded>,
-    // The descriptor sets refer to them. The caller guarantees that no work that uses them is in flight when the
-    // target is dropped.
+    // The descriptor sets refer to these buffers. The caller guarantees that no work that uses them is in flight when
+    // the target is dropped.
     _buffers: Vec<Buffer>,
 }
 
@@ -277,7 +277,7 @@ impl CrowdTarget {
         let windows = [crowd.window(), room];
         let recording = &mut work.recording;
         let stages = Stages::new(recording, shape, kernels, &resources, windows);
-        // As for frames.
+        // Recorded once now, for the same reason as frames.
         stages.record(recording, room);
         work.bind(|kernel| engine.pipeline(kernel))?;
         Ok(Self {
@@ -400,7 +400,7 @@ impl CrowdReader {
         })
     }
 
-    /// Whether the reader is for this output and has room for so many instances.
+    /// Whether the reader is for this output and has room for `instances` instances.
     fn fits(&self, output: CrowdOutput, instances: u32) -> bool {
         self.target.output == output && self.target.room >= instances
     }
@@ -450,7 +450,7 @@ mod tests {
     use crate::shader::Kernel;
     use crate::tracks::set::TrackSet;
 
-    /// An instance of so many joints, each with a time base if there are many.
+    /// A crowd whose skeleton has `joints` joints; with `has_many_bases`, each joint has its time base.
     fn crowd(mapping: Mapping, joints: usize, layers: usize, has_many_bases: bool) -> Vec<Crowd> {
         let skeleton = Skeleton::chain(joints, 1.0).unwrap();
         let mut library = CrowdLibrary::new(&skeleton).unwrap();
@@ -518,7 +518,8 @@ mod tests {
         }
     }
 
-    /// A driver compiles it wrongly: the kernel with the memory of workgroups takes its place, and the report says so.
+    /// If a driver compiles the kernel wrongly, the kernel that uses workgroup memory is used instead, and the report
+    /// says so.
     #[test]
     fn a_kernel_by_subgroups_that_differs_is_replaced() {
         use crate::gpu::pipeline::faults::MISCOMPILED;

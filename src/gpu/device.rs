@@ -338,19 +338,19 @@ impl Drop for LogicalDevice {
         if !self.may_destroy() {
             return;
         }
-        // SAFETY: every object created from it held an `Arc` to this and is gone.
+        // SAFETY: every object created from it held an `Arc` to this and was dropped.
         unsafe { self.shared.free(&self.raw) };
-        // SAFETY: every object created from the device held an `Arc` to it and is gone.
+        // SAFETY: every object created from the device held an `Arc` to it and was dropped.
         unsafe { self.pipelines.destroy(&self.raw) };
         if self.owned {
-            // SAFETY: every object created from the device held an `Arc` to it and is gone.
+            // SAFETY: every object created from the device held an `Arc` to it and was dropped.
             unsafe { self.raw.destroy_device(None) };
         }
     }
 }
 
-/// The lock of every queue that an engine of this process uses, by the queue's handle: several engines may be made of
-/// one application's device, and each of them makes a [`DeviceQueue`] for the same queue.
+/// The lock of every queue that an engine of this process uses, by the queue's handle. All engines share it, because
+/// several engines may be made of one application's device, each with a [`DeviceQueue`] for the same queue.
 static LOCKS: Mutex<BTreeMap<u64, Weak<Mutex<()>>>> = Mutex::new(BTreeMap::new());
 
 /// A queue as one engine uses it.

@@ -176,7 +176,7 @@ impl ExportedResult {
         let info = vk::MemoryGetFdInfoKHR::default()
             .memory(self.exported.buffer.memory().0)
             .handle_type(FILE);
-        // SAFETY: memory of this device, allocated to be exported so.
+        // SAFETY: memory of this device, which was allocated for export as a file descriptor.
         let file = unsafe { exports.get_memory_fd(&info) }.named("vkGetMemoryFdKHR")?;
         // SAFETY: the file was made just now, for the caller, who closes it.
         Ok(unsafe { std::os::fd::FromRawFd::from_raw_fd(file) })
@@ -200,7 +200,7 @@ impl ExportedResult {
         let info = vk::SemaphoreGetFdInfoKHR::default()
             .semaphore(semaphore)
             .handle_type(SEMAPHORE_FILE);
-        // SAFETY: a semaphore of this device, made to be exported so.
+        // SAFETY: a semaphore of this device, which was created for export as a file descriptor.
         let file = unsafe { exports.get_semaphore_fd(&info) }.named("vkGetSemaphoreFdKHR")?;
         // SAFETY: the file was made just now, for the caller, who closes it.
         let file = unsafe { std::os::fd::FromRawFd::from_raw_fd(file) };

@@ -262,8 +262,8 @@ const MAX_BYTES: u64 = 256 << 20;
 /// The number of results whose lists a clip keeps.
 const MAX_RESULTS: usize = 2;
 
-/// The lists that a clip keeps for frames at a rate. They are kept from the second time that the same ones are
-/// requested, so that single requests cost nothing.
+/// The lists that a clip keeps for frames at a rate. They are kept when they are requested for the second time, so that
+/// single requests take no memory for them.
 #[derive(Default)]
 pub(crate) struct ListCache(Mutex<CachedLists>);
 

@@ -171,7 +171,8 @@ mod tests {
     use crate::time::frames::SampleTimes;
     use crate::tracks::set::TrackSet;
 
-    /// Plans for devices have no rows that only the CPU computes. If one had, no value would be missing.
+    /// Plans for devices have no rows that only the CPU computes. The test requests such rows nevertheless: the host
+    /// must then compute them.
     #[test]
     fn rows_that_a_device_does_not_compute_are_the_hosts() {
         let mut set = TrackSet::new();

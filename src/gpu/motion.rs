@@ -25,7 +25,8 @@ use crate::threads::exclusive::Exclusive;
 use crate::threads::stop;
 use crate::work::motion::{StatesResources, StatesShape, TreeResources, record_window};
 
-/// Windows begin at multiples of so many instances. Their arrays then begin where kernels can bind them.
+/// Windows begin at multiples of this number of instances, so that their arrays begin at offsets at which kernels can
+/// bind them.
 const LEAST_WINDOW: u64 = 64;
 
 /// The size of a window's states: on a software device they stay in the processor's cache.
@@ -299,10 +300,10 @@ impl ResidentMotions {
                 output: None,
             }),
         };
-        // Work on an exported result may still go on.
+        // The last call may have returned while the device still worked on its exported result.
         work.submission.wait()?;
         self.run_windows(&mut work, request, ranges, target)?;
-        // Not after an error, when a recording may be half way.
+        // After an error the work is dropped, because its recording may be incomplete.
         *kept = Some(work);
         Ok(())
     }
@@ -341,7 +342,8 @@ impl ResidentMotions {
             let last = count.min(first + window);
             self.submit(work, (&shape, ranges), first..last, target)?;
             let is_waited_for = match target {
-                // Its readers wait.
+                // The readers of an exported result wait for its semaphore. Only the last window may be left to them:
+                // the others reuse the same buffers.
                 StatesTarget::Exported(exported) => last < count || !exported.has_timeline(),
                 StatesTarget::InPlace(_) | StatesTarget::Copied(_) => true,
             };
@@ -390,7 +392,7 @@ impl ResidentMotions {
         Ok(())
     }
 
-    /// Submits a window of instances. The last one ends with what makes the result known to its readers.
+    /// Submits a window of instances. After the last window, the commands make the result visible to its readers.
     fn submit(
         &self,
         work: &mut StatesWork,

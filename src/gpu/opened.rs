@@ -184,7 +184,7 @@ impl Opened {
         trust(&engine, &self.options)?;
         let mut current = lock(&self.current);
         // Worker threads do not wait for `reopening` (`Exclusive::take`), so another thread may have opened the device
-        // meanwhile; then its engine stays.
+        // meanwhile. Then the engine of that thread is kept.
         if Arc::ptr_eq(&current, lost) {
             *current = Arc::new(engine);
         }

@@ -56,8 +56,8 @@ pub struct PassTarget {
     /// Whether weights must be between 0 and 1.
     are_fractions: bool,
     bytes: u64,
-    // The descriptor sets refer to them. The caller guarantees that no work that uses them is in flight when the
-    // target is dropped.
+    // The descriptor sets refer to these buffers. The caller guarantees that no work that uses them is in flight when
+    // the target is dropped.
     _buffers: Vec<Buffer>,
 }
 
@@ -101,7 +101,8 @@ impl Parts<'_> {
         Ok(weights)
     }
 
-    /// The layers of a blend one after another: where they are, or copied into a buffer.
+    /// A range in which the layers of a blend follow each other: the layers' memory if it has this form, or else a
+    /// buffer into which they are copied.
     fn layers(&mut self, layers: &[VulkanBuffer], size: u64) -> Result<Slice, VulkanError> {
         let all = size.saturating_mul(layers.len() as u64);
         self.check("the layers of a blend", all)?;
@@ -294,17 +295,17 @@ impl PassTarget {
     /// Records the pass into the application's command buffer.
     ///
     /// Recording neither waits nor allocates. It records the weights, whose values stay in the commands, and one
-    /// dispatch; for poses that are added frame by frame one dispatch for each 65 536 values; and before a blend a
-    /// copy of each layer, unless the layers are contiguous. Barriers are included, as for the samples of a clip
-    /// ([`ClipTarget::record`](crate::gpu::clip::ClipTarget::record)): the pass waits for all commands
-    /// recorded before it, and later commands see the result. The commands may be submitted any number of times.
+    /// dispatch. For poses that are added frame by frame it records one dispatch for each 65 536 values. Before a blend
+    /// it records a copy of each layer, unless the layers are contiguous. Barriers are included, as for the samples of
+    /// a clip ([`ClipTarget::record`](crate::gpu::clip::ClipTarget::record)): the pass waits for all commands recorded
+    /// before it, and later commands see the result. The commands may be submitted any number of times.
     ///
     /// # Safety
     /// The command buffer must belong to the engine's device and to a queue family that can compute, and must be in
     /// the recording state, outside a render pass. The target must live until the work has ended. All recordings of
     /// one target must run on one queue.
     pub unsafe fn record(&self, commands: vk::CommandBuffer) {
-        // SAFETY: promised by the caller.
+        // SAFETY: as the caller promises.
         unsafe { self.record_between(commands, CommandScopes::default()) };
     }
 
@@ -314,7 +315,7 @@ impl PassTarget {
     /// # Safety
     /// As for [`PassTarget::record`]; and the application has its own barriers for other commands that use this memory.
     pub unsafe fn record_between(&self, commands: vk::CommandBuffer, scopes: CommandScopes) {
-        // SAFETY: promised by the caller.
+        // SAFETY: as the caller promises.
         let commands = unsafe { Commands::new(&self.engine.device, commands) };
         self.record_into(commands.between(scopes.with_earlier_recordings()));
     }

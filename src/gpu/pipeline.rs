@@ -197,7 +197,8 @@ pub(crate) mod faults {
     use crate::shader::Kernel;
 
     thread_local! {
-        /// The kernel whose pipelines add where they should multiply, if this thread makes them.
+        /// For tests: a kernel whose pipelines, if this thread creates them, contain an addition instead of a
+        /// multiplication.
         pub(crate) static MISCOMPILED: Cell<Option<Kernel>> = const { Cell::new(None) };
     }
 

@@ -16,7 +16,7 @@ const MAX_BYTES: usize = 64 << 20;
 /// A pipeline cache of Vulkan; null if it could not be made, which only costs time.
 pub(crate) struct PipelineCache {
     pub(crate) raw: vk::PipelineCache,
-    /// Whether it is an application's, which keeps it as it likes.
+    /// Whether it belongs to an application, which then stores it.
     is_of_application: bool,
     files: Cache,
     name: String,

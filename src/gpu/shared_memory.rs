@@ -106,7 +106,7 @@ impl SharedMemory {
     /// Nothing may use the blocks any more.
     pub(crate) unsafe fn free(&self, device: &ash::Device) {
         for block in lock(&self.0).drain(..) {
-            // SAFETY: promised by the caller.
+            // SAFETY: as the caller promises.
             unsafe { device.free_memory(block.whole.memory, None) };
         }
     }

@@ -130,7 +130,7 @@ impl Submission {
         Ok(())
     }
 
-    /// Records the work, behind what was recorded directly, and submits it to the queue.
+    /// Records the work, after the commands that were recorded directly, and submits it to the queue.
     pub(crate) fn submit(&mut self) -> Result<(), VulkanError> {
         self.submit_between(None, None)
     }
@@ -312,7 +312,7 @@ impl Drop for Semaphore {
             // A fence shows that the copy has ended. But Mesa's drivers that emulate timeline semaphores still use
             // them for a moment after they signal the fence.
             if !self.is_exported {
-                self.device.settle(); // timelines that can be exported are no such
+                self.device.settle(); // semaphores that can be exported are not emulated
             }
             // SAFETY: created from this device; the code that submits with it has waited for the work.
             unsafe { self.device.raw.destroy_semaphore(self.raw, None) };

@@ -1,5 +1,5 @@
-//! Samples of a clip at times that are known only when they are recorded: the host finds their segments, and the
-//! commands contain what it found.
+//! Samples of a clip at times that are known only when they are recorded: the host finds the segment of each sample,
+//! and the commands contain the list of these.
 
 use std::sync::{Arc, Mutex};
 

@@ -101,8 +101,8 @@ impl Cache {
     }
 }
 
-/// Whether only this process's user and the system's administrator could have written a file: a driver gets the
-/// compiled kernels in it, and a checksum is no protection, because anyone can compute it.
+/// Whether only this process's user and the system's administrator could have written a file. This is required because
+/// a driver gets the compiled kernels in the file. A checksum is no protection, because anyone can compute it.
 #[cfg(unix)]
 fn is_trusted(metadata: &fs::Metadata) -> bool {
     use std::os::unix::fs::MetadataExt as _;
@@ -112,7 +112,7 @@ fn is_trusted(metadata: &fs::Metadata) -> bool {
 }
 
 /// Whether a file's permissions let only its owner write it, and the owner is this user or the system's administrator.
-/// Where the system does not say whose the process is, only the permissions count.
+/// If the user of the process is unknown, only the permissions count.
 #[cfg(unix)]
 fn is_private(owner: u32, mode: u32, user: Option<u32>) -> bool {
     let is_of_user = user.is_none_or(|user| [user, 0].contains(&owner));
@@ -265,7 +265,7 @@ mod tests {
         }
     }
 
-    /// A file that was cut, changed, put under another name, or is none.
+    /// Catches a damaged file that is used: one that was cut, was changed, has another name, or is a folder.
     #[test]
     fn what_is_damaged_is_not_there() {
         let folder = tempfile::tempdir().unwrap();

@@ -1,5 +1,5 @@
-//! Machines evaluate. The CPU ([`cpu`](crate::cpu)) and Vulkan devices (`gpu`) implement one trait, and the layers
-//! above know no other difference.
+//! Machines evaluate. The CPU ([`cpu`](crate::cpu)) and Vulkan devices (`gpu`) implement the same trait, so that the
+//! layers above need not distinguish them.
 //!
 //! * [`Machine`]: evaluates rows of samples, takes prepared tracks ([`MachineClip`]) and crowds ([`MachineCrowd`]), and
 //!   runs passes over poses ([`PassRunner`]). A request goes to a machine as its [`Plan`](plan::Plan) says, which depends
@@ -8,11 +8,11 @@
 //! * [`EngineOptions`], [`EvaluateError`], [`reports`] and the files that
 //!   are kept from process to process ([`cache`]): every build has them, with and without the feature `vulkan`.
 //!
-//! The traits have no methods for operations of Vulkan devices alone, such as writing into an application's buffer:
-//! callers ask for the device itself (`gpu::Opened::of`).
+//! The traits have no methods for operations that only Vulkan devices have, such as writing into an application's
+//! buffer. Callers get the device for these by `gpu::Opened::of`.
 
 pub(crate) mod cache;
-// On the CPU, crowds are evaluated without these.
+// Only devices use these types: the CPU evaluates crowds without them.
 #[cfg_attr(not(feature = "vulkan"), allow(dead_code))]
 pub(crate) mod crowd;
 pub(crate) mod error;
@@ -76,7 +76,7 @@ pub(crate) trait Machine: Any + Send + Sync {
         work: &mut dyn FnMut(&dyn PassRunner) -> Result<(), EvaluateError>,
     ) -> Result<(), EvaluateError>;
 
-    /// Takes the tables of a crowd; `None` where the host evaluates crowds.
+    /// Takes the tables of a crowd; `None` if the host evaluates crowds.
     fn crowd(&self, _: &CrowdSource<'_>) -> Result<Option<Box<dyn MachineCrowd>>, VulkanError> {
         Ok(None)
     }
@@ -131,7 +131,7 @@ pub(crate) trait Machine: Any + Send + Sync {
 pub(crate) trait MachineClip: Any + Send + Sync {
     fn data(&self) -> &Arc<ClipData>;
 
-    /// Evaluates all tracks; the result stays in memory of the device where that saves a copy. Explicit times must have
+    /// Evaluates all tracks; the result stays in memory of the device if this saves a copy. Explicit times must have
     /// been folded into the time range of the keys by the wrap mode ([`ClipData::folded`]).
     fn evaluate(
         &self,

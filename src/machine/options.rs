@@ -97,9 +97,10 @@ pub enum PrepareArcs {
     OnDevice,
 }
 
-/// Where an engine keeps, from process to process, data that takes time to make: the driver's compiled kernels
-/// (`pipelines-…`), the kernels that passed their check (`kernel-checks`), and the speed of each model of card
-/// (`probe-…`, for [`Engine::auto`](crate::engine::Engine::auto)). An engine reads and writes no other files.
+/// The folder in which an engine keeps files for later processes, because their data takes time to make. They contain
+/// the driver's compiled kernels (`pipelines-…`), the kernels that passed their check (`kernel-checks`), and the speed
+/// of each model of card (`probe-…`, for [`Engine::auto`](crate::engine::Engine::auto)). An engine reads and writes no
+/// other files.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 #[non_exhaustive]
 pub enum CacheFiles {
@@ -171,8 +172,8 @@ with_fields! {
 }
 
 /// How many neighbouring invocations of a graphics card evaluate a run of samples together, track by track, for runs of
-/// each class of lengths ([`RunLanes::CLASSES`]). Only powers of two from 4 to 32 are used: other numbers are as the next
-/// smaller one, or the nearest of these.
+/// each class of lengths ([`RunLanes::CLASSES`]). Only powers of two from 4 to 32 are used. Other numbers are rounded
+/// down to a power of two; numbers outside 4 to 32 count as 4 or 32.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct RunLanes(pub [u32; 5]);

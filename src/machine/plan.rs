@@ -1,6 +1,6 @@
-//! The choice of a route, once for each request. A [`Plan`] says how a request is evaluated; it is made from the
-//! request and the [`Limits`] of a machine, and knows no device. Every public function of the engine that evaluates
-//! makes a plan and carries it out; `explain` prints the plan.
+//! The choice of a route, once for each request. A [`Plan`] says how a request is evaluated; it depends only on the
+//! request and the [`Limits`] of a machine, not on a device. Every public function of the engine that evaluates makes a
+//! plan and carries it out; `explain` prints the plan.
 //!
 //! Every route gives the same bits; routes differ in the segments that they prepare and keep. If a set has fewer
 //! samples than keys, most prepared segments would never be used, and a set larger than memory cannot be prepared as
@@ -33,10 +33,10 @@ pub(crate) struct Limits {
     pub(crate) memory: Option<usize>,
     /// Bytes of segments that go into one buffer of a device; `None` on the CPU.
     pub(crate) group_bytes: Option<usize>,
-    /// With at least so many keys, the device prepares the arcs between them; `None` if the host always does.
+    /// With at least this many keys, the device prepares the arcs between them; `None` if the host always does.
     pub(crate) prepares_arcs_from: Option<usize>,
-    /// With more bytes of segments, a clip keeps keys alone where its samples can be computed from them; `None` if
-    /// clips always keep segments.
+    /// If its segments take more bytes than this, a clip keeps only its keys, if samples can be computed from them;
+    /// `None` if clips always keep segments.
     pub(crate) kept_segments: Option<usize>,
 }
 
@@ -62,7 +62,7 @@ impl Limits {
         !cfg!(smallest) && matches!(self.kind, MachineKind::Cpu { .. })
     }
 
-    /// Whether a device prepares the arcs between so many keys.
+    /// Whether a device prepares the arcs between this number of keys.
     pub(crate) fn prepares_arcs(&self, keys: usize) -> bool {
         self.prepares_arcs_from.is_some_and(|from| keys >= from)
     }
@@ -92,7 +92,7 @@ pub(crate) enum Rows {
     /// do not have it.
     SparseSamples,
     /// In batches: a thread of the CPU prepares some intervals, evaluates them while their segments are in its cache,
-    /// and forgets them. For a device as [`Rows::SparseSamples`].
+    /// and drops them. With a device, the host does this, as for [`Rows::SparseSamples`].
     Batches {
         /// Whether a long track may be divided into several parts.
         cuts_tracks: bool,
@@ -132,8 +132,8 @@ struct Stream {
     segment_bytes: usize,
 }
 
-/// The number of values of tracks with one of several interpolations that are evaluated before they are copied to
-/// their places: the memory that this takes.
+/// The number of values of tracks with one of several interpolations that are evaluated before they are copied to their
+/// places. It limits the memory of these values.
 const GROUP_VALUES: usize = 1 << 22;
 
 /// How many tracks with one of several interpolations are evaluated before their values are copied to their places.
@@ -141,8 +141,8 @@ pub(crate) fn tracks_at_once(samples: usize) -> usize {
     (GROUP_VALUES / samples.max(1)).max(1)
 }
 
-/// The number of samples for each key from which the CPU prepares segments: a segment's samples side by side in vectors
-/// then cost less than its curve in a lane saves.
+/// The number of samples for each key from which on the CPU prepares segments. With fewer samples, it is faster to
+/// compute the curve of each interval while its samples are evaluated.
 const SAMPLES_OF_A_KEY: usize = 8;
 
 /// Rotations for which another thread is worth waking.
@@ -170,12 +170,12 @@ const DENSE_BYTES: usize = 64 << 20;
 /// most of the time.
 const MIN_KEYS: usize = 256;
 
-/// The minimum number of keys of a track for which a piece is divided at a sample: both pieces prepare the intervals
-/// at the division, which are then few relative to the others.
+/// Pieces of a track with at least this many keys may be divided at a sample. Both pieces prepare the intervals at the
+/// division; with so many keys, these are only a small part.
 const KEYS_TO_CUT: usize = 8;
 
 impl Plan {
-    /// Decides how a request is evaluated; with `chunk`, as a stream in chunks of so many values.
+    /// Decides how a request is evaluated; with `chunk`, as a stream in chunks of about `chunk` values.
     pub(crate) fn of(
         request: &SetRequest<'_>,
         layout: Layout,
@@ -201,7 +201,7 @@ impl Plan {
         limits: &Limits,
     ) -> Vec<Self> {
         let chunk = chunk.filter(|&chunk| chunk < whole.len());
-        // The segments of all groups exist at the same time.
+        // The bytes are added, because the segments of all groups are in memory at the same time.
         let bytes = requests.iter().map(bytes_of);
         let segment_bytes = bytes.fold(0, usize::saturating_add);
         let plan = |request: &SetRequest<'_>| {
@@ -314,7 +314,7 @@ impl Route {
                 let (tracks, keys) = (request.tracks.len(), request.batch().keys(request.set));
                 let are_short = keys <= LONG_TRACK * tracks;
                 let is_held = request.interpolation.wrap().are_held();
-                // All threads share the samples of a piece, but each batch has one.
+                // All threads share the samples of a piece, but one thread evaluates a whole batch.
                 let batches = match cuts_tracks {
                     true => tracks + keys / PART_INTERVALS,
                     false => tracks,
@@ -646,8 +646,8 @@ mod tests {
         }
     }
 
-    /// Catches a text that describes a route other than the one that is carried out, a door that decides by itself, and
-    /// a route with other bits.
+    /// Catches a text that describes another route than the one that is used, a function of the engine that does not
+    /// follow the plan, and a route with other bits.
     #[test]
     fn the_plan_that_is_printed_is_carried_out_by_every_door() {
         let (first, last) = (0.0, 3.9);

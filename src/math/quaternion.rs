@@ -288,8 +288,8 @@ const ARC_TANGENT: [f64; 11] = [
 /// The arc tangent of `t`, 0 <= t <= 1, within 5e-16 of it, relative.
 #[inline(always)]
 pub(crate) fn arc_tangent(t: f64) -> f64 {
-    // Twice the arc tangent of half the angle, which the polynomial gives to the last digits: long
-    // tangents of a curve multiply an angle's error.
+    // The angle is twice the arc tangent of half of it, because the polynomial is more exact for half the angle. The
+    // exactness matters: long tangents of a curve multiply an angle's error.
     let half = t / (1.0 + (1.0 + t * t).sqrt());
     let z = half * half;
     let [c0, c1, c2, c3, c4, c5, c6, c7, c8, c9, c10] = ARC_TANGENT;

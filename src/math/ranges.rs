@@ -1,5 +1,5 @@
-//! Exponentials, logarithms, sines and cosines in the principal range, half-angles up to pi/2, by
-//! polynomials alone; and exponentials and logarithms over the full range for the rest.
+//! Exponentials, logarithms, sines and cosines in the principal range (half-angles up to pi/2), computed by polynomials
+//! only; and exponentials and logarithms over the full range, for all other angles.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -230,7 +230,7 @@ impl<R: Real> PrincipalRange<R> {
 
     #[inline(always)]
     fn check(&mut self, value: R, limit: f64) {
-        // NaN sets the doubt too.
+        // If the value is NaN, the doubt is set, too.
         self.doubt = value.up_to(R::all(limit), self.doubt, R::all(1.0));
     }
 }

@@ -59,7 +59,7 @@ pub(crate) fn refuse_more_than_there_is<T>(
 }
 
 /// The memory in bytes that this process can still get without swap space: the memory that the system has free or can
-/// free; in a container at most the rest of its limit. `None` where the system does not say, such as in a browser.
+/// free; in a container at most the rest of its limit. `None` if the system does not say, such as in a browser.
 ///
 /// Allocations of 256 MiB and more are refused with an [`OutOfMemoryError`] if less than they need is available, swap
 /// space included. Systems may promise memory that they do not have, and then end the process that uses it.
@@ -97,7 +97,8 @@ fn left(swap: Swap) -> Option<u64> {
 }
 
 /// The part of a system's free memory that a container's limit leaves: the limit without the memory of its processes.
-/// Files that it has in memory give way. A limit of all memory is none.
+/// Memory that caches files counts as free, because the system frees it when it is needed. A limit that is not less
+/// than the whole memory is ignored.
 #[cfg(not(target_family = "wasm"))]
 fn within_limits(free: u64, total: u64, limits: Option<(u64, u64)>) -> u64 {
     match limits {

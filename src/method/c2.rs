@@ -138,7 +138,7 @@ fn jumps(track: Track, signs: Signs<'_>, interpolation: &Interpolation) -> Vec<u
         let previous = if key == 0 { last - 1 } else { key - 1 };
         let nearby = [previous, key, key + 1].map(|key| velocities[key]);
         let bend = before.bend(nearby[1]) * equation.bend_scale;
-        // NaN counts as a jump.
+        // If a number is NaN, the comparison is false, so that this counts as a jump.
         let is_continuous =
             (equation.residual(nearby) + bend).length() <= JUMP * equation.size(nearby);
         if !is_continuous {

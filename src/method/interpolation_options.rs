@@ -175,7 +175,7 @@ impl InterpolationOption {
         (self.set)(options, value)
     }
 
-    /// The text by which the option is set to the value that it has; `None` where it depends on the method, and for
+    /// The text by which the option is set to the value that it has; `None` if it depends on the method, and for
     /// a number that is 0.
     #[must_use]
     pub fn get(self, options: &InterpolationOptions) -> Option<String> {

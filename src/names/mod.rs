@@ -15,8 +15,8 @@ pub struct UnknownNameError {
     pub known: Vec<&'static str>,
 }
 
-/// Names of other programs and libraries for the values of options: each value with these names. A name counts only for
-/// options that have the value, so one may stand in several rows.
+/// Names that other programs and libraries use for the values of options: for each value, these names. A name applies
+/// only to options that have the value, so a name may be in several rows.
 const OTHER_NAMES: [(&str, &[&str]); 22] = [
     ("slerp", &["linear", "lerp", "line", "lines"]),
     ("linear", &["lerp", "slerp", "line", "lines"]),

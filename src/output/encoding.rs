@@ -471,7 +471,7 @@ impl Encoding {
         (row.encode)(rotations, row.detail, output);
     }
 
-    /// Decodes one rotation, which is equal up to rounding and sign, or one vector.
+    /// Decodes one rotation or one vector. The rotation equals the encoded one up to rounding and sign.
     ///
     /// # Errors
     /// When the length of `bytes` is not that of one rotation.

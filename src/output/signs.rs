@@ -121,7 +121,7 @@ impl InLanes for NearBlocks<'_> {
 mod tests {
     use super::*;
 
-    /// As many rotations as a block has, one fewer and one more; slow and fast ones.
+    /// Tests lists with as many rotations as a block, one fewer and one more; with slow and with fast rotations.
     #[test]
     fn a_jump_is_found_wherever_it_is() {
         for step in [0.0, 0.01, 0.3, 1.5] {

@@ -78,7 +78,8 @@ pub enum BodyArray {
     JointRates,
     /// Positions of bodies in the world.
     Positions,
-    /// Rotations in the world, in the order that the frames have.
+    /// Rotations in the world; the order of components is that of the frames
+    /// ([`TreeFrames`](crate::trees::TreeFrames)).
     Rotations,
     /// Velocities in the world.
     Velocities,

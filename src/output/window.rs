@@ -56,7 +56,7 @@ impl Window {
             Layout::TrackMajor => (self.tracks.clone(), self.samples.clone()),
             Layout::FrameMajor => (self.samples.clone(), self.tracks.clone()),
         };
-        // As many whole rows as fit, or parts of a row if a single one does not fit.
+        // A piece has as many whole rows as fit into the limit; if a single row does not fit, it has a part of one.
         let rows_each = (limit / columns.len().max(1)).max(1);
         let columns_each = columns.len().min(limit).max(1);
         let pieces = |of: Range<usize>, each: usize| {

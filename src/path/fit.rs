@@ -155,7 +155,7 @@ impl InLanes for InFit<'_> {
     fn run<L: Lanes>(&mut self) {
         let [zero, one] = [L::Doubles::all(0.0), L::Doubles::all(1.0)];
         self.lanes.units = [1.0; MAX_LANES];
-        // The segment of each lane.
+        // The segment of each lane has the lane's number.
         let segment_indices: [usize; MAX_LANES] = std::array::from_fn(|lane| lane);
         for lane in (0..self.count).step_by(L::COUNT) {
             let middle = load::<L::Doubles, 4, _>(&self.samples[MIDDLE], lane);

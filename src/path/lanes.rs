@@ -1,5 +1,5 @@
-//! Directions and carried rotations in vector lanes. A lane is a piece of a stretch, or a span of time on one; a
-//! block is filled with those of several paths. All lanes are evaluated at one sample after the other.
+//! Directions and carried rotations in vector lanes. A lane is a piece of a stretch, or a span of time on a stretch;
+//! the lanes of a block may belong to several paths. All lanes are evaluated together, one sample after the other.
 
 use crate::fit::block::{load, put, store};
 use crate::math::quaternion::{

@@ -1,10 +1,10 @@
 //! Bodies that follow paths: their directions on curves through points, and their speed.
 //!
-//! **Principle.** A pose on a path depends on the whole path before it: a rotation-minimising frame is an integral, a
+//! **Principle.** A pose on a path depends on the whole path before it. A rotation-minimising frame is an integral, a
 //! constant speed needs arc lengths, and a closed path distributes the roll that remains at its end. A kernel cannot
-//! compute this sample by sample. Therefore everything is sampled once in f64 on the host and fitted by the
-//! polynomials ([`fit`]) of all other smooth curves: devices then evaluate positions and rotations as those of any
-//! clip, with the same bits, at any frame rate.
+//! compute this sample by sample. Therefore everything is sampled once in f64 on the host and fitted by polynomials
+//! ([`fit`]), as all other smooth curves are. Devices then evaluate positions and rotations as those of any clip, with
+//! the same bits, at any frame rate.
 //!
 //! **Steps**, for about 256 keys of one or more tracks at a time ([`prepare`]):
 //!

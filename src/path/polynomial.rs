@@ -59,7 +59,8 @@ impl Polynomial {
         (zeros, rest)
     }
 
-    /// A zero from 0 to 1: the least of the lengths at the ends and where they have a minimum.
+    /// The parameter from 0 to 1 at which the polynomial is shortest, if its length there is at most `tolerance`; both
+    /// ends and the minima between them are compared.
     fn zero(&self, tolerance: f64) -> Option<f64> {
         // If all Bernstein coefficients are on one side of a plane, the curve is on this side, too.
         let [c0, c1, c2, c3] = self.0;
@@ -110,7 +111,7 @@ impl Polynomial {
 mod tests {
     use super::*;
 
-    /// Catches a zero that is missed, and a rest that is not the direction beside it.
+    /// Catches a zero that is missed, and a quotient that is not the direction next to the zero.
     #[test]
     fn zeros_are_divided_out() {
         let direction = Polynomial([DVec3::X, DVec3::Y, DVec3::Z, DVec3::ZERO]);

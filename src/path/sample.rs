@@ -164,7 +164,7 @@ impl<'a> Sampler<'a> {
         &self.rows.values
     }
 
-    /// The rotations of the other frames.
+    /// The rotations of frames that are not minimal.
     fn by_axes(&mut self, spans: &[Span]) {
         let SpanRows {
             parameters,

@@ -30,7 +30,8 @@ use crate::tracks::set::vectors::{Channel, VectorTrack};
 /// The number of tracks whose vectors are prepared as one piece of work.
 const VECTOR_BATCH: usize = 256;
 
-/// The number of tracks from which it pays to find the samples of their times once for all of them.
+/// With at least this many consecutive tracks with the same times, it is faster to find their samples once for all of
+/// them.
 const ALIKE: usize = 4;
 
 /// The prepared tracks on the host, from which the work of every device is computed.
@@ -63,13 +64,13 @@ pub(crate) struct PrepareRequest<'a> {
     /// Groups are made large from the start and not merged, because copying them together would take longer than one
     /// dispatch for each.
     pub(crate) large_groups: bool,
-    /// Arcs are listed for a device that computes them, where the list says all that it needs: not as
-    /// keys are authored, since arcs of more than half a turn are cut in f64.
+    /// Whether arcs are listed for a device that computes them. This is not possible with signs as authored, because
+    /// arcs of more than half a turn are divided in f64.
     pub(crate) lists_arcs: bool,
     /// The only timeline that will be sampled; intervals without a sample of it may be left out.
     pub(crate) only_for: Option<&'a Timeline>,
-    /// Whether polynomials are packed ([`Prepared::pack`]), which pays for clips that are kept; groups that are merged
-    /// are not.
+    /// Whether polynomials are packed ([`Prepared::pack`]). This is worth its time for clips that are kept; groups that
+    /// will be merged are not packed.
     pub(crate) packs: bool,
     /// Groups whose memory is reused.
     pub(crate) spare: Vec<Prepared>,
@@ -229,7 +230,7 @@ impl ClipData {
         track: impl Fn(usize) -> Cow<'t, VectorTrack> + Sync,
         request: &VectorRequest<'_>,
     ) -> Result<Self, OutOfThreadsError> {
-        // As a velocity, a vector is refused where an output is for rotations only.
+        // Vectors count as velocities here, so that outputs that are for rotations only refuse them.
         let interpolation = Interpolation {
             quantity: Quantity::Velocity(Axes::Parent),
             ..*request.interpolation
@@ -306,10 +307,10 @@ impl ClipData {
         }
     }
 
-    /// For each track a number that consecutive tracks share if their intervals have the same times; [`NONE`] for
-    /// tracks that are not [regular](Prepared::is_regular), or whose arcs are not those between their keys as they are
-    /// stored, and where fewer than [`ALIKE`] tracks in succession have the same times. Found once, when they are asked
-    /// for.
+    /// For each track a number, which consecutive tracks share if their intervals have the same times. It is [`NONE`]
+    /// if the track is not [regular](Prepared::is_regular), if its arcs are not those between its stored keys, or if
+    /// fewer than [`ALIKE`] consecutive tracks have these times. The numbers are found once, when they are first
+    /// needed.
     pub(crate) fn time_classes(&self) -> &[u32] {
         self.time_classes.get_or_init(|| {
             let (mut last, mut class): (&[f64], u32) = (&[], 0);

@@ -19,8 +19,8 @@
 //! | [`smooth::SmoothPreparation`] | the strategy for all other curves: blocks of 128 intervals |
 //! | [`fast::FastPreparation`] | its fast way, in f32 straight from four keys |
 //! | [`fitting::Fitting`] | its exact way: queues of curves that wait for a full block, and the cutter |
-//! | [`constant_speed::PendingInterval`] | a curve at constant speed, until its whole track is there |
-//! | [`packed::PackedSegments`] | the segments of a clip that is kept on the CPU, without their zeros |
+//! | [`constant_speed::PendingInterval`] | a curve at constant speed, until all curves of its track are known |
+//! | [`packed::PackedSegments`] | the segments of a clip that is kept on the CPU, without the coefficients that are 0 |
 //! | [`prepared::Prepared`] | the result of preparing a batch |
 //! | [`clip_data::ClipData`] | all that is prepared of a clip, and which parts a track has |
 //!

@@ -1,6 +1,6 @@
 //! Packed segments of clips that are kept on the CPU: the coefficients that are +0 are left out. Nearly all curves of
 //! recorded motion have small angles and need seven rows of eleven, 112 bytes instead of 176, so that samples read less
-//! memory. The index of a segment says its degree, and is in the span, which is read anyway.
+//! memory. The index of a segment contains its degree; it is stored in the span, which is read anyway.
 
 use bytemuck::TransparentWrapper;
 
@@ -9,8 +9,9 @@ use crate::time::spans::{SOURCE_INDEX, SpanSource, StoredSource};
 use crate::twin::Evaluate as _;
 use crate::twin::evaluate_polynomial::Polynomial;
 
-/// The rows of some packed segments, one segment behind the other. A slice, not a struct with one: where a function takes
-/// a reference to it, the compiler knows that stores to the output change no coefficient, and keeps them in registers.
+/// The rows of some packed segments, one segment after the other. It is an unsized type around a slice, not a struct
+/// that refers to a slice. If a function takes a reference to such a type, the compiler knows that stores to the output
+/// change no coefficient, and keeps the coefficients in registers.
 #[derive(TransparentWrapper)]
 #[repr(transparent)]
 pub(crate) struct PackedSegments([[f32; 4]]);
@@ -89,7 +90,8 @@ impl PackedSegments {
     #[inline(always)]
     fn rows<const ROWS: usize>(&self, row: usize) -> &Polynomial<ROWS> {
         let rows = self.0[row..row + ROWS].first_chunk();
-        // Never the zeros, because the slice has `ROWS` rows; the compiler sees no panic here.
+        // The zeros are never used, because the slice has `ROWS` rows. They are given so that no code for a panic is
+        // compiled.
         rows.unwrap_or(const { &[[0.0; 4]; ROWS] })
     }
 
@@ -100,9 +102,8 @@ impl PackedSegments {
     }
 }
 
-/// Packs polynomials, which are all fitted and divided, and changes the indices in the sources of their spans; returns the
-/// rows. Polynomials that are so many that an index has no room for their rows, and those for which there is no memory to
-/// pack them, stay as they are.
+/// Packs polynomials, after all of them are fitted and divided, and changes the indices in the sources of their spans;
+/// returns the rows. Nothing is packed if an index has too few bits for so many rows, or if there is not enough memory.
 pub(crate) fn pack(
     polynomials: &mut Vec<PolynomialSegment>,
     sources: &mut [StoredSource],
@@ -120,7 +121,8 @@ pub(crate) fn pack(
         indices.push(index);
         end += index.row_count();
     }
-    // In the same memory: no segment moves to a row behind its own.
+    // The rows are moved within the same memory. This overwrites no row that is still needed, because a segment never
+    // moves towards the end.
     let mut rows: Vec<[f32; 4]> = bytemuck::cast_vec(std::mem::take(polynomials));
     for (index, first) in indices.iter().zip((0..).step_by(POWERS)) {
         rows.copy_within(first..first + index.row_count(), index.row());

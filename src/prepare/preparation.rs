@@ -414,7 +414,7 @@ impl SetRequest<'_> {
         of_batch.start.max(self.samples.start).min(end)..end
     }
 
-    /// Refuses what cannot be interpolated as requested, also where no sample needs it.
+    /// Refuses tracks that cannot be interpolated as requested, also if the fault is at keys that no sample needs.
     pub(crate) fn check(&self) -> Result<(), InterpolationError> {
         self.interpolation.check_wraps()?;
         self.tracks.clone().try_for_each(|track| {
@@ -424,8 +424,8 @@ impl SetRequest<'_> {
     }
 }
 
-/// The part of a set's time that samples must leave out for the intervals in it not to be prepared: finding the others
-/// takes a search in the key times of every track.
+/// If the samples leave out at least this part of a set's time, the intervals in that part are not prepared. For a
+/// smaller part, the search in the key times of every track would take longer than it saves.
 const LEFT_OUT: f64 = 0.25;
 
 #[cfg(test)]

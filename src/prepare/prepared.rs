@@ -70,8 +70,8 @@ impl Prepared {
         }
     }
 
-    /// Reserves memory for this number of keys, so that the lists are not copied as they grow, and do not use twice
-    /// the memory; lists that are reused do not grow to twice their length for a few keys more.
+    /// Reserves memory for this number of keys. Otherwise the lists would be copied as they grow, and could take twice
+    /// the memory. Lists that are used again grow only by the missing keys, not to twice their length.
     pub(crate) fn reserve(&mut self, keys: usize) -> Result<(), OutOfMemoryError> {
         let bytes = segment_size(self.segments.form) + size_of::<[f32; 4]>();
         let too_many = || OutOfMemoryError::new::<u8>(SEGMENTS, keys.saturating_mul(bytes));
@@ -86,7 +86,8 @@ impl Prepared {
         self.spans.try_reserve_exact(keys).map_err(refused)
     }
 
-    /// Removes what only whole tracks need, so that the curves and their spans remain, in no more memory than these take.
+    /// Removes the data that only whole tracks need. The curves and their spans remain, in no more memory than they
+    /// need.
     pub(crate) fn keep_curves(&mut self) {
         if !(self.spans.sources.iter())
             .any(|source| matches!(source.source(), SpanSource::Constant(_)))
@@ -172,7 +173,7 @@ impl Prepared {
         Some(first)
     }
 
-    /// Moves all of `other` behind what it has.
+    /// Appends all of `other`.
     fn append(&mut self, other: Self) {
         let constants = self.constants.len() as u32;
         let segments = self.segments.len() as u32;
@@ -386,7 +387,7 @@ impl Prepared {
     }
 }
 
-/// The segments of one group, all of one form and in one list: the others stay empty.
+/// The segments of one group. All have one form and are in the list of this form; the other lists are empty.
 #[derive(Debug, Clone)]
 pub(crate) struct Segments {
     pub(crate) form: Form,

@@ -79,7 +79,7 @@ impl SmoothPreparation {
         let all = track.keys.len() - 1;
         let first_key = prepared.constants.len() as u32;
         let of_rotations = self.interpolation.quantity == Quantity::Rotation;
-        // A curve that does not pass through its keys has end values of its own.
+        // If a curve does not pass through its keys, its end values are not its first and its last key.
         let meets_keys = of_rotations && self.interpolation.method.interpolates || all == 0;
         let last_key = first_key + intervals.len() as u32;
         // Intervals that stand still are held at a key, so the keys are stored for them too.
@@ -375,10 +375,10 @@ impl SmoothPreparation {
         uses_ends && self.interpolation.ends == Ends::Frozen
     }
 
-    /// Adds the values at a track's ends, if a stretch reaches them, and outside: the curves that extrapolate the
-    /// track with the angular velocity of its ends, if the wrap mode requests it; and, if the curve does not pass
-    /// through its keys, the constants that are held there: its end values for rotations, 0 for velocities and
-    /// accelerations.
+    /// Adds the values at a track's ends and outside them, if a stretch reaches these ends. If the wrap mode requests
+    /// it, these are curves that extrapolate the track with the angular velocity of its ends. If the curve does not
+    /// pass through its keys, they are constants that are held there: the curve's end values for rotations, 0 for
+    /// velocities and accelerations.
     fn add_ends(&self, prepared: &mut Prepared, stretch: &TrackStretch) {
         let Interpolation { before, after, .. } = self.interpolation;
         let of_rotations = self.interpolation.quantity == Quantity::Rotation;

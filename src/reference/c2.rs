@@ -156,9 +156,9 @@ impl<'a> System<'a> {
         [at(key.wrapping_sub(1)), at(key), at(key + 1)]
     }
 
-    /// The strength of the bend at a key relative to the rest of its equations: the angle of the interval before it,
-    /// times the rate of the rotation vector at the interval's end in radians per interval, times the weight of the
-    /// interval.
+    /// The strength of the bend at a key relative to the rest of its equations. It is the product of three numbers: the
+    /// angle of the interval before the key, the rate of the rotation vector at the interval's end in radians per
+    /// interval, and the weight of the interval.
     fn strength(&self, key: usize, velocities: &[DVec3]) -> f64 {
         if key == 0 || self.set[key].is_some() {
             return 0.0;

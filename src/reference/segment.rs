@@ -74,7 +74,7 @@ impl Basis {
         match self {
             Self::Bernstein => [6.0 * t - 6.0, 6.0 - 12.0 * t, 6.0 * t],
             Self::Knots(knots) => {
-                // The same rule once more, for the functions of degree 2 in the first derivatives:
+                // The rule of the first derivatives, applied to the functions of degree 2 in them:
                 // N_{j,2}' = 2 (N_{j,1}/(u_{j+2}-u_j) - N_{j+1,1}/(u_{j+3}-u_{j+1})).
                 let length = knots[3] - knots[2];
                 let [_, n0, n1, n2] = b_spline(knots, 1, knots[2] + t * length);

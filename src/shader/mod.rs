@@ -62,7 +62,7 @@ pub(crate) struct KernelCode {
     pub(crate) subgroups: bool,
 }
 
-/// The variants of kernels that a device takes where they are.
+/// The variants of kernels that a device uses if they exist.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Variants {
     /// Whether to use the variants that read texel buffers.
@@ -77,7 +77,8 @@ impl Kernel {
         &KERNELS[self as usize]
     }
 
-    /// Whether others evaluate the same where a device cannot run this one, or where its bits differ from the CPU's.
+    /// Whether other kernels can replace this one: on a device that cannot run it, or on which its bits differ from the
+    /// CPU's.
     pub(crate) fn is_replaceable(self) -> bool {
         self.compiled().subgroups
     }

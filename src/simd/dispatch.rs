@@ -173,10 +173,10 @@ pub(crate) fn in_lanes_into<W: InLanesInto<I, O>, I: ?Sized, O: ?Sized>(
     }
     match width.narrowed() {
         #[cfg(wide_vectors)]
-        // SAFETY: the processor has AVX-512, for `narrowed` gives only what it has.
+        // SAFETY: the processor has AVX-512, because `narrowed` returns only widths that the processor has.
         VectorWidth::Avx512 => unsafe { avx512(work, input, output) },
         #[cfg(wide_vectors)]
-        // SAFETY: the processor has AVX2, likewise.
+        // SAFETY: the processor has AVX2, for the same reason.
         VectorWidth::Avx2 => unsafe { avx2(work, input, output) },
         _ => baseline(work, input, output),
     }

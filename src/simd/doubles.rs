@@ -38,8 +38,7 @@ impl Doubles for f64 {
     }
 }
 
-/// Defines a pair of vectors of f64, with the given functions of one vector, which the macro `$run`
-/// calls.
+/// Defines a pair of vectors of f64 from functions of one vector, which the macro `$run` calls.
 macro_rules! doubles {
     ($name:ident: $vector:ident, $run:ident, $all:path, $add:path, $sub:path,
      $mul:path, $div:path, $root:path, $min:path, $max:path, $up_to:path, $are_at_most:path) => {

@@ -35,7 +35,7 @@ macro_rules! alike_at_any_width {
 
         #[inline(always)]
         fn transposed([a, b, c, d]: [Self; 4]) -> [Self; 4] {
-            // Written out: closures are not always inlined.
+            // Written out without a closure, because closures are not always inlined.
             $run! {
                 let (ab_low, ab_high) = ($to_doubles($low(a.0, b.0)), $to_doubles($high(a.0, b.0)));
                 let (cd_low, cd_high) = ($to_doubles($low(c.0, d.0)), $to_doubles($high(c.0, d.0)));
@@ -253,7 +253,7 @@ impl Lanes for Eight {
     #[inline(always)]
     fn gather_rotations(rotations: &[[f32; 4]], indices: &[u32]) -> [Self; 4] {
         let [a, b, c, d, e, f, g, h]: [u32; 8] = *indices.first_chunk().expect("eight indices");
-        // Written out: closures are not always inlined.
+        // Written out without a closure, because closures are not always inlined.
         Self::transposed([
             Self::of_two(rotations[a as usize], rotations[b as usize]),
             Self::of_two(rotations[c as usize], rotations[d as usize]),

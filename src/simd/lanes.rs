@@ -155,7 +155,7 @@ pub(crate) trait Lanes: Choice + Pod {
     #[inline(always)]
     fn load_rotations(rotations: &[[f32; 4]]) -> [Self; 4] {
         let (all, each) = (&rotations[..Self::COUNT], Self::COUNT / 4);
-        // Written out: closures are not always inlined.
+        // Written out without a closure, because closures are not always inlined.
         Self::transposed([
             Self::load_side_by_side(all),
             Self::load_side_by_side(&all[each..]),

@@ -198,7 +198,7 @@ impl Lanes for Sixteen {
     #[inline(always)]
     fn gather_rotations(rotations: &[[f32; 4]], indices: &[u32]) -> [Self; 4] {
         let indices: &[u32; 16] = indices.first_chunk().expect("sixteen indices");
-        // Written out: closures are not always inlined.
+        // Written out without a closure, because closures are not always inlined.
         macro_rules! four {
             ($a:literal $b:literal $c:literal $d:literal) => {
                 Self::of_four([

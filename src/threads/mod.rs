@@ -1,9 +1,9 @@
 //! The engine's threads. The engine does not use rayon's global pool, because that pool does not work in a forked
 //! process, and ends the program if the system refuses threads.
 //!
-//! Every thread that waits for work of the engine sleeps. A worker of a caller's rayon pool would otherwise, as
-//! rayon's workers do, run other tasks of that pool while it waits, and such a task could need a lock that the
-//! waiting call or its caller has.
+//! Every thread that waits for work of the engine sleeps. Otherwise a worker of a caller's rayon pool would run other
+//! tasks of that pool while it waits, as rayon's workers do. Such a task could need a lock that the waiting call or its
+//! caller has.
 
 // Without the feature `vulkan`, nothing uses `exclusive`.
 #[cfg_attr(not(feature = "vulkan"), allow(dead_code))]
@@ -171,7 +171,7 @@ impl Threads {
         if rayon::current_thread_index().is_none() {
             return Ok(threads.install(work));
         }
-        // A worker of another pool would take up other work while it waits; a thread does not.
+        // A worker of another pool would start another task while it waits, so a separate thread waits instead.
         thread::scope(|scope| {
             let waiting = thread::Builder::new()
                 .spawn_scoped(scope, || threads.install(work))
@@ -189,7 +189,7 @@ impl Threads {
         if let Some(first) = of_first() {
             return Ok(Arc::clone(&first.threads));
         }
-        // Only for starting threads: no work is done while this is locked.
+        // The lock is held only while threads are started, never while they work.
         let mut forked = lock(&self.forked);
         let there = of_first().or(forked.as_ref().filter(|pool| pool.process == process));
         if let Some(pool) = there {
@@ -316,8 +316,8 @@ mod tests {
         assert_eq!(on_threads(rayon::current_num_threads), Ok(count()));
     }
 
-    /// A worker of another library's pool that took up another task while it waits would meet the lock of
-    /// the task below on its own stack.
+    /// Catches a worker of another library's pool that starts another task while it waits: the task would wait for the
+    /// lock of the task that is interrupted on the same stack.
     #[test]
     fn a_callers_worker_that_waits_takes_up_no_other_task() {
         let callers = rayon::ThreadPoolBuilder::new()

@@ -35,8 +35,9 @@ impl<'a> FramePlan<'a> {
         }
     }
 
-    /// The samples of a window; their keys are counted from the first of `of`. They are computed only if times, clock
-    /// or window differ from the last call's; the number is another one then.
+    /// The samples of a window, and the number of their computation. Samples are computed again, with a new number,
+    /// only if times, clock or window differ from those of the last call. Their keys are counted from the first key of
+    /// `of`.
     pub(crate) fn samples(
         &mut self,
         of: TrackKeys<'a>,

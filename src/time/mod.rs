@@ -3,11 +3,11 @@
 //!
 //! # Principle
 //!
-//! Seconds are f64 and stay on the host. A kernel gets a whole number of frames from the frame nearest to a segment's
-//! middle, with a scale and an offset in f32; so a frame at hour 24 is as exact as the first. The parameter of a
-//! sample is a function of its number, not a sum of steps, so that windows, chunks and vector widths have no effect.
-//! A key time within its rounding of a whole frame counts as that frame ([`frame_clock::FrameClock::boundary`]), and
-//! the sample there is the key, bit for bit.
+//! Seconds are f64 and stay on the host. A kernel gets a whole number of frames, counted from the frame nearest to a
+//! segment's middle, with a scale and an offset in f32. So a frame at hour 24 is as exact as the first. The parameter
+//! of a sample is a function of its number, not a sum of steps, so that windows, chunks and vector widths have no
+//! effect. A key time within its rounding of a whole frame counts as that frame
+//! ([`frame_clock::FrameClock::boundary`]), and the sample there is the key, bit for bit.
 //!
 //! # Types
 //!

@@ -1,5 +1,5 @@
-//! A time as the sum of two numbers. One f64 has steps of 0.24 µs at 1.7e9 s, within which a fast joint rotates
-//! visibly: such a frame, or its position in a copy of a track, is between two of these steps.
+//! A time as the sum of two numbers. At 1.7e9 s, one f64 has steps of 0.24 µs, in which a fast joint rotates
+//! measurably. The time of a frame, or its position in a copy of a track, lies between two of these steps.
 
 use crate::time::frame_rate::FrameRate;
 

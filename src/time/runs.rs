@@ -225,7 +225,7 @@ impl Iterator for Occupied {
 pub(crate) struct IntervalBlocks<'a> {
     clock: FrameClock,
     starts: &'a [f64],
-    /// Where the last interval ends.
+    /// The end of the last interval.
     end: f64,
     /// The requested samples.
     samples: Range<usize>,
@@ -300,7 +300,7 @@ struct FillBlock<'a> {
     clock: FrameClock,
     /// At most [`LEN`].
     starts: &'a [f64],
-    /// Where the last of them ends.
+    /// The end of the last of these intervals.
     next: f64,
     samples: [f64; 2],
     block: &'a mut IntervalBlock,

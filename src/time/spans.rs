@@ -36,7 +36,7 @@ pub(crate) enum SpanSource {
     Exact(u32),
 }
 
-/// A [`SpanSource`] in the four bytes that a span keeps: the kind in the two highest bits, and the index.
+/// A [`SpanSource`] in four bytes, as a span stores it: the kind in the two highest bits, and the index.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct StoredSource(u32);
 
@@ -83,20 +83,21 @@ pub(crate) struct TrackPart {
     /// The index of its first key in the track.
     pub(crate) first_key: u32,
     pub(crate) spans: Range<usize>,
-    /// Where the last span ends in seconds.
+    /// The end of the last span in seconds.
     pub(crate) end: f64,
     /// The constant held before the first key; [`NONE`] when another part has it.
     pub(crate) before: u32,
     /// The constant held from the last key on; [`NONE`] when another part has it.
     pub(crate) after: u32,
-    /// Additional data for its ends, which are rarely needed. Boxed, because a crowd has a million parts.
+    /// Additional data for the ends of the track, which few tracks need. They are in a box, because a crowd has a
+    /// million parts.
     pub(crate) extension: Option<Box<TrackExtension>>,
 }
 
 /// Data for a track's ends and the time outside its keys.
 #[derive(Debug, Clone)]
 pub(crate) struct TrackExtension {
-    /// The constant at exactly the last key; [`NONE`] if the one held after it serves there too.
+    /// The constant at exactly the last key; [`NONE`] if it is the same as the constant that is held after the key.
     pub(crate) at_end: u32,
     /// The curves, evaluated in f64, that extrapolate before the first key and after the last.
     /// Their parameter is seconds from that key; [`NONE`] where constants are held.
@@ -478,7 +479,7 @@ impl Spans {
         let starts = &self.starts[part.spans.clone()];
         let i = interval_at(starts, time, 0);
         let end = starts.get(i + 1).copied().unwrap_or(part.end);
-        // Written out: closures are not always inlined.
+        // Written out without a closure, because closures are not always inlined.
         let is_within = !starts.is_empty() && starts[i] <= time && time < end;
         if !is_within {
             return None;

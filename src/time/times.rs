@@ -71,7 +71,8 @@ fn even_interval(starts: &[f64], time: f64) -> usize {
     };
     let intervals = starts.len() - 1;
     let passed = (time - first) / (last - first) * intervals as f64;
-    // The cast limits times outside and numbers that are not finite to the range.
+    // The cast gives a valid index also for times outside the keys and for numbers that are not finite, because casts
+    // of floats saturate.
     (passed as usize).min(intervals)
 }
 

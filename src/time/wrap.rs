@@ -275,7 +275,7 @@ mod tests {
         }
     }
 
-    /// A billion copies out, each sample is where exact arithmetic has it.
+    /// Even in the billionth copy, each sample has the position that exact arithmetic gives.
     #[test]
     fn far_copies_lie_where_they_repeat() {
         let wrap = Wrap {
@@ -285,7 +285,7 @@ mod tests {
         let start = 1.7e9 + 0.5;
         let frames = SampleTimes::fps(8).between(start, start + 3.0);
         let timeline = frames.resolve(1, None).unwrap();
-        // 3.125 s: 1.7e9 s are 544 000 000 copies.
+        // A copy lasts 3.125 s, so the copy at 1.7e9 s has the number 544 000 000.
         let span = Some((0.0, 3.125));
         let copies: Vec<TrackCopy> = wrap.copies(span, &timeline, 0..25).collect();
         let at = |at_first, backwards| CopyPosition::Frames {

@@ -1,4 +1,4 @@
-//! Which joints of two clips are the same. All that combines clips of a skeleton matches their joints here.
+//! Which joints of two clips are the same. All functions that combine clips of one skeleton match their joints here.
 
 use std::borrow::Cow;
 use std::collections::{HashMap, HashSet};
@@ -320,8 +320,8 @@ impl Joints {
         })
     }
 
-    /// Refuses pairs of joints whose parents are not such a pair. If the parents of either clip are not known, nothing is
-    /// refused.
+    /// Refuses a pair of joints if their parents are not a pair, too. If the parents of either clip are not known,
+    /// nothing is refused.
     ///
     /// # Errors
     /// The first joint with another parent.

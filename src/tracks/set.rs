@@ -173,7 +173,8 @@ impl TrackSet {
         self.keys.len()
     }
 
-    /// A set of the rotations alone: without names, vectors, scalars, and what only some methods need of keys.
+    /// A set of only the rotations: without names, vectors, scalars, and data of keys that only some methods need, such
+    /// as angular velocities.
     pub(crate) fn of_rotations(&self) -> Self {
         Self {
             keys: self.keys.clone(),

@@ -8,8 +8,8 @@ mod tests {
 
     use super::*;
 
-    /// Catches a wrong digit in a coefficient, which bit equality alone would not: both
-    /// twins read the same one.
+    /// Catches a wrong digit in a coefficient. A comparison of bits cannot catch it, because both twins use the same
+    /// coefficient.
     #[test]
     fn middles_and_tangents_are_as_accurate_as_stated() {
         for step in 0..=10_000 {

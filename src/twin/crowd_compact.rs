@@ -15,7 +15,7 @@ use crate::twin::evaluate_arc::norm_squared;
 use crate::twin::functions::cubic;
 use crate::twin::small_angle::{SmallAngleCubic, small_angle_cubic};
 
-/// The bits of 2^23, the float from which on sources are stored.
+/// The bits of 2^23 as an f32. The source `s` of an interval is stored as the f32 2^23 + s, whose lowest bits are `s`.
 pub(crate) const SOURCE_FLOAT: u32 = 0x4b00_0000;
 
 /// Whether a form consists of the keys of a clip that is stored compactly.
@@ -39,7 +39,7 @@ pub(crate) fn authored_key(stored: [f32; 4]) -> [f32; 4] {
 #[inline(always)]
 fn scaled_where_long<N: Choice>(stored: [N; 4], factor: N) -> [N; 4] {
     let is_short = norm_squared(stored).at_most(N::all(LONGEST_KEY));
-    // Written out: closures are not always inlined.
+    // Written out without a closure, because closures are not always inlined.
     [
         N::choose(is_short, stored[0], stored[0] * factor),
         N::choose(is_short, stored[1], stored[1] * factor),
@@ -100,7 +100,8 @@ impl<'a> CubicRows<'a> {
         bytemuck::cast(self.cells[self.row(row)])
     }
 
-    /// The rows of the keys before, at the start, at the end and after an interval, and the weights of the two between.
+    /// The rows of four keys of an interval (before it, at its start, at its end and after it), and the weights of the
+    /// two keys at its start and its end.
     #[inline(always)]
     pub(crate) fn around(&self, row: usize) -> ([usize; 4], [TangentWeights; 2]) {
         let weights = [self.weights(row), self.weights(row + 1)];

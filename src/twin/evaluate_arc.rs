@@ -66,7 +66,7 @@ impl Evaluate for ArcSegment {
             sine_cosm1_quarter(begun.parameter, begun.z)
         };
         let (s, f) = (sine.fourfold(), cosine_minus_one.fourfold());
-        // Written out: closures are not always inlined.
+        // Written out without a closure, because closures are not always inlined.
         let mut quarters = [
             arc_component(middle, tangent, s[0], f[0]),
             arc_component(middle, tangent, s[1], f[1]),

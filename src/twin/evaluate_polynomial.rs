@@ -39,7 +39,8 @@ macro_rules! run_of_polynomial {
     };
 }
 
-/// The coefficients of these powers in all lanes. Written out: closures are not always inlined.
+/// The coefficients of these powers in all lanes. Written out without a closure, because closures are not always
+/// inlined.
 macro_rules! repeated {
     ($rows:expr, $($power:literal)+) => {
         [$(L::repeated($rows[$power])),+]
@@ -135,8 +136,8 @@ of_rows!(7, true, end_of_degree_6, 0 1 2 3 4 5 6);
 of_rows!(9, true, end_of_degree_8, 0 1 2 3 4 5 6 7 8);
 of_rows!(11, false, polynomial_end, 0 1 2 3 4 5 6 7 8 9 10);
 
-/// [`polynomial_end`] where the coefficients beyond s⁶ are +0. Its terms with them are zeros, and no other term of its
-/// sums is -0: each ends with a coefficient, which is not, or with such a sum.
+/// [`polynomial_end`] for polynomials whose coefficients of higher powers than s⁶ are +0. The terms of these
+/// coefficients are zeros. Leaving them out changes no bit, because no sum to which they would be added is -0.
 #[inline(always)]
 fn end_of_degree_6<N: Number>(c: [N; 7], begun: PolynomialBegun<N>) -> N {
     let PolynomialBegun { s, z, zz } = begun;

@@ -85,7 +85,7 @@ impl<T: Stored, const N: usize> Stored for [T; N] {
     }
 }
 
-/// Where the members of a struct lie, in words.
+/// The offsets of the members of a struct, in words.
 macro_rules! stored {
     ($name:ident, ($($generic:tt)*), $words:literal $(, $member:ident $offset:literal)+) => {
         stored!(@ $name, [$($generic)*], $words $(, $member $offset)+);
@@ -185,7 +185,7 @@ pub(crate) struct InvocationIds {
     pub(crate) subgroup_invocation_id: u32,
 }
 
-/// The lanes of a subgroup, if nothing else is said. No result depends on it.
+/// The lanes of a subgroup, unless [`Memory::with_subgroups_of`] sets another number. No result depends on it.
 const SUBGROUP_LANES: u32 = 32;
 
 /// The machine on which an invocation of a kernel runs: its indices and its memory.
@@ -199,28 +199,28 @@ pub(crate) trait Machine {
 
     fn ids(&self) -> InvocationIds;
 
-    /// The elements of so many words in a buffer.
+    /// The number of elements of a buffer; an element has `words` words.
     fn length(&self, global: Global, words: usize) -> u32;
 
     fn load<T: Stored>(&self, global: Global, at: usize) -> T;
 
     fn store<T: Stored>(&self, global: Global, at: usize, value: T);
 
-    /// Begins a block of so many operations, in a line of the generated file.
+    /// Begins a block of `steps` operations, in a line of the generated file.
     fn block(&self, line: u32, steps: usize) -> Self::Block;
 
-    /// Shows a word to the other lanes of the subgroup, or nothing more.
+    /// Sets the word that the other lanes of the subgroup can read; with `None` they can read none any more.
     fn show(&self, word: Option<u32>);
 
     /// The word that a lane of the subgroup shows.
     fn shown(&self, lane: u32) -> Option<u32>;
 }
 
-/// Sees what an invocation does. `()` looks away.
+/// Observes the operations of an invocation. `()` observes nothing.
 pub(crate) trait Watch {
     type Block;
 
-    /// Where a load or a store of so many words goes: where the kernel says, unless a test has it go wrong.
+    /// The location of a load or a store: the one that the kernel states, unless a test plants a wrong one.
     #[cfg_attr(test, track_caller)]
     fn location(&self, at: usize, _words: usize) -> usize {
         at
@@ -241,8 +241,8 @@ impl Watch for () {
     fn block(&self, _: u32, _: usize) {}
 }
 
-/// A kernel's buffers, the constants of its dispatch, and the memory of a workgroup. Stores make a buffer longer; loads
-/// from behind its end give [`UNTOUCHED`].
+/// A kernel's buffers, the constants of its dispatch, and the memory of a workgroup. A store after the end of a buffer
+/// makes it longer; a load after its end gives [`UNTOUCHED`].
 pub(crate) struct Memory {
     code: usize,
     variables: Vec<RefCell<Vec<u32>>>,
@@ -307,7 +307,7 @@ impl Memory {
         texels.is_some()
     }
 
-    /// Runs subgroups of so many lanes, a power of two, from now on.
+    /// Sets the number of lanes of a subgroup, a power of two.
     #[cfg(test)]
     pub(crate) fn with_subgroups_of(self, subgroup_lanes: u32) -> Self {
         Self {
@@ -316,7 +316,7 @@ impl Memory {
         }
     }
 
-    /// Whether a buffer lies there, not memory of a workgroup, nor what comes with a dispatch.
+    /// Whether it is a buffer, and not memory of a workgroup or the constants of a dispatch.
     #[cfg(test)]
     pub(crate) fn is_buffer(&self, global: Global) -> bool {
         ENTRIES[self.code].bound.contains(&global)
@@ -354,7 +354,7 @@ impl Memory {
         }
     }
 
-    /// Runs one workgroup; returns what watched each invocation.
+    /// Runs one workgroup; returns the observer of each invocation.
     pub(crate) fn run_group<F: Float, W: Watch>(
         &self,
         group: [u32; 3],

@@ -121,8 +121,8 @@ pub(crate) trait Evaluate: NoUninit {
         self.at(parameter).canonical().to_array()
     }
 
-    /// Whether segments of this type have the coefficients of one degree alone, and none needs a filter: those of which
-    /// [`Evaluate::is_canonical`] is false are of another type.
+    /// Whether segments of this type have only the coefficients of one degree and never need the filter of tiny
+    /// components. Segments that need it have another type.
     const IS_SHORT: bool = false;
 
     /// Whether [`canonical`](crate::math::canonical::canonical) would change no component of any sample, so that no

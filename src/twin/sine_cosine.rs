@@ -11,8 +11,8 @@ mod tests {
 
     use super::*;
 
-    /// Catches a wrong digit in a coefficient, which bit equality alone would not:
-    /// both twins read the same one.
+    /// Catches a wrong digit in a coefficient. A comparison of bits cannot catch it, because both twins use the same
+    /// coefficient.
     #[test]
     fn sine_and_cosine_are_as_accurate_as_stated() {
         let short: fn(f32) -> (f32, f32) = |angle| {

@@ -74,7 +74,7 @@ pub(crate) struct CrowdDevice<'a> {
     pub(crate) runs: &'a dyn Fn(Kernel) -> bool,
 }
 
-/// How instances are evaluated as wholes, by one kernel for all steps.
+/// The kernel that evaluates whole instances: one kernel for all steps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum WholeKernel {
     Subgroups(SubgroupInstances),
@@ -108,7 +108,7 @@ impl WholeKernel {
 /// The kernels that evaluate frames of a crowd.
 pub(crate) struct FrameKernels {
     output: CrowdOutput,
-    /// How instances are evaluated as wholes, if they are: by one kernel for all steps.
+    /// The kernel that evaluates whole instances, if one kernel does all steps.
     pub(crate) whole: Option<WholeKernel>,
     /// The kernels, in their order.
     pub(crate) kernels: Vec<Kernel>,

@@ -1,6 +1,6 @@
-//! The recording of the states of a motion library's clips: joints in their parents' frames, the walk along the
-//! skeleton or along the tree of a robot, differences where velocities are those, and a copy of each array that is asked
-//! for.
+//! The recording of the states of a motion library's clips. Its steps are: joints in their parents' frames; the walk
+//! along the skeleton or along the tree of a robot; differences, if velocities are differences; a copy of each
+//! requested array.
 
 use std::ops::Range;
 
@@ -51,7 +51,7 @@ pub(crate) struct StatesResources {
     pub(crate) channels: Resource,
     pub(crate) cells: Resource,
     pub(crate) links: Resource,
-    /// Clips and ticks, window by window: those of the instances, then the ends of their steps.
+    /// Clips and ticks, window by window: first of the instances, then of both ends of their steps.
     pub(crate) samples: Resource,
     /// Steps in a second, of each instance.
     pub(crate) rates: Resource,
@@ -187,7 +187,7 @@ pub(crate) fn record_window(
                 };
                 dispatch(recording, set, stored);
             }
-            // Only a tree has such arrays.
+            // Never happens: only requests with a tree have such arrays.
             (StoredNumbers::Picked { .. }, None) => {}
         }
     }

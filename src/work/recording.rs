@@ -1,12 +1,12 @@
 //! A recording: copies, dispatches and the barriers between them, over resources that have only numbers.
 //!
-//! [`Recorded`](crate::gpu::recorded::Recorded) says which memory a resource is, and writes the steps into a command
+//! [`Recorded`](crate::gpu::recorded::Recorded) knows the memory of each resource, and writes the steps into a command
 //! buffer. A recording that is filled again needs no new memory for as many steps as before.
 //!
-//! Barriers follow from how kernels use their bindings ([`Access`], which the compiler of the shaders lists): a step
-//! waits for the earlier steps that wrote what it reads, or that used what it writes, unless a barrier has ordered
-//! them already. Two rules make this exact without knowing addresses: resources do not overlap, except those that are
-//! only read; and kernels that only write a resource, like copies into it, each write a part of their own.
+//! Barriers follow from how kernels use their bindings ([`Access`], which the compiler of the shaders lists). A step
+//! waits for the earlier steps that wrote what it reads, or that used what it writes, unless a barrier has ordered them
+//! already. Two rules make this exact without knowing addresses: resources do not overlap, except those that are only
+//! read; and kernels that only write a resource, and copies into it, write different parts of it.
 
 use std::mem::take;
 use std::ops::Range;
@@ -348,7 +348,7 @@ impl Recording {
         start..self.bytes.len()
     }
 
-    /// Puts a step that uses these resources behind those that it needs.
+    /// Adds a barrier, if necessary, so that a step with these resources runs after the steps that it needs.
     fn order(&mut self, by: By, uses: impl IntoIterator<Item = (Slice, Access), IntoIter: Clone>) {
         let uses = uses.into_iter();
         let before = (uses.clone())
@@ -386,7 +386,7 @@ impl Recording {
     }
 }
 
-/// Workgroups for so many invocations, in a row.
+/// The workgroups for this number of invocations, along x.
 pub(crate) fn workgroups(invocations: u32) -> [u32; 3] {
     [invocations.div_ceil(WORKGROUP), 1, 1]
 }

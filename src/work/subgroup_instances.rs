@@ -21,8 +21,9 @@ pub(crate) struct SubgroupInstances {
 }
 
 impl SubgroupInstances {
-    /// For rotations of one layer of arcs each, of which some instances fill whole lines of memory. Their times take
-    /// about as long as the joints of one instance, so a subgroup has as many instances as it has room for.
+    /// The instances of a subgroup, for rotations of one layer of arcs. `None` for other crowds, and if no number of
+    /// instances fits whose joints fill whole cache lines. Finding the times takes about as long as evaluating the
+    /// joints of one instance. Therefore a subgroup gets as many instances as fit.
     pub(crate) fn new(
         arguments: &CrowdDispatch,
         output: CrowdOutput,
@@ -61,7 +62,7 @@ impl SubgroupInstances {
         (pushed, subgroups.div_ceil(of_workgroup))
     }
 
-    /// The arguments of a dispatch whose subgroups take so many instances, as a power of two.
+    /// The arguments of a dispatch whose subgroups take 2^`instances_log2` instances.
     pub(crate) fn pushed(instances_log2: u32, arguments: &CrowdDispatch) -> CrowdSubgroupDispatch {
         let positions = (arguments.bases << instances_log2).next_power_of_two();
         CrowdSubgroupDispatch {

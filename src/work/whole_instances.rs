@@ -25,7 +25,7 @@ pub(crate) struct WholeInstances {
 }
 
 impl WholeInstances {
-    /// `None` where an instance is too large for a workgroup's memory.
+    /// `None` if an instance is too large for a workgroup's memory.
     pub(crate) fn new(
         arguments: &CrowdDispatch,
         output: CrowdOutput,
@@ -40,7 +40,8 @@ impl WholeInstances {
         } = *arguments;
         let is_rotations = output.values == CrowdValues::Rotations;
         let room = (MAX_WHOLE_JOINTS / joints).min(MAX_WHOLE_POSITIONS / (layers * bases));
-        // Joints of a level are divided among instances by bits, so those of matrices are a power of two.
+        // For matrices, an invocation finds its instance and its joint by operations on bits, without a division.
+        // Therefore the number of instances must be a power of two.
         let is_divided = |instances: &u32| is_rotations || instances.is_power_of_two();
         // The number of iterations of a workgroup over its joints. Rotations are stored immediately. They may begin
         // within a line; then the invocations before them are idle.
@@ -61,7 +62,7 @@ impl WholeInstances {
                 (true, Compact) => Kernel::CrowdCompactWholeRotations,
                 (false, Plain) => Kernel::CrowdPlainWholeMatrices,
                 (false, Any) => Kernel::CrowdWholeMatrices,
-                // It would need 256 registers on AMD's processors: its steps have kernels each.
+                // One kernel for all steps would need 256 registers on AMD's cards, so there is a kernel for each step.
                 (false, Compact) => return None,
             },
             output,
@@ -70,7 +71,7 @@ impl WholeInstances {
     }
 
     /// The arguments of a dispatch over as many instances as `arguments` counts, and how many workgroups it has.
-    /// `levels` says where the levels of the skeleton begin among the links, and where they end.
+    /// `levels` has the index of the first link of each level of the skeleton, and the end of the last level.
     pub(crate) fn dispatch(
         &self,
         arguments: CrowdDispatch,
@@ -100,7 +101,8 @@ impl WholeInstances {
     }
 }
 
-/// The factor by which kernels divide joints among instances of so many joints: 2^20 divided by their number, rounded up.
+/// The factor with which kernels compute the instance of a joint index by a multiplication: 2^20 divided by the number
+/// of joints of an instance, rounded up.
 pub(crate) fn joint_share(joints: u32) -> u32 {
     const SHARE_BITS: u32 = 20;
     (1u32 << SHARE_BITS).div_ceil(joints)

@@ -41,7 +41,7 @@ impl Renderer {
         let instance = wgpu::Instance::new(options);
         let adapter = pollster::block_on(instance.request_adapter(&Default::default()))?;
         let request = wgpu::DeviceDescriptor {
-            // Software devices are faster with it.
+            // The feature is optional; with it, software devices are faster.
             required_features: adapter.features() & wgpu::Features::SHADER_INT64,
             required_limits: adapter.limits(),
             ..Default::default()

@@ -59,7 +59,7 @@ pub enum RecordError<E> {
 /// # Errors
 /// When the device belongs to another backend of wgpu.
 pub fn handles(device: &wgpu::Device) -> Result<VulkanHandles, NotVulkan> {
-    // SAFETY: nothing of it is destroyed.
+    // SAFETY: the object is not destroyed here.
     let raw = unsafe { device.as_hal::<Vulkan>() }.ok_or(NotVulkan { object: "device" })?;
     let instance = raw.shared_instance();
     let mut handles = VulkanHandles::new(
@@ -78,8 +78,8 @@ pub fn handles(device: &wgpu::Device) -> Result<VulkanHandles, NotVulkan> {
 
 /// Creates a buffer of zeros for results, with the usages that Tumble needs (`STORAGE` and `COPY_DST`) and `usage`.
 ///
-/// wgpu fills a buffer with zeros before the first use that it knows of, which would be after Tumble has written it. This
-/// buffer is filled and submitted here, so wgpu leaves it alone.
+/// wgpu fills a buffer with zeros before the first use that it knows of, which would be after Tumble has written it.
+/// This buffer is filled and submitted here, so wgpu does not fill it later.
 #[must_use]
 pub fn buffer(
     device: &wgpu::Device,
@@ -94,7 +94,7 @@ pub fn buffer(
         mapped_at_creation: true,
     });
     buffer.unmap();
-    // The copy from the mapped memory is part of this submission.
+    // wgpu copies the zeros from the mapped memory in the next submission, which is this one.
     queue.submit([]);
     buffer
 }
@@ -104,7 +104,7 @@ pub fn buffer(
 /// # Errors
 /// When the buffer belongs to another backend of wgpu.
 pub fn range(buffer: &wgpu::Buffer) -> Result<VulkanBuffer, NotVulkan> {
-    // SAFETY: nothing of it is destroyed.
+    // SAFETY: the object is not destroyed here.
     let raw = unsafe { buffer.as_hal::<Vulkan>() }.ok_or(NotVulkan { object: "buffer" })?;
     // SAFETY: as above.
     let handle = unsafe { raw.raw_handle() };

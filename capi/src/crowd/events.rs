@@ -41,8 +41,8 @@ impl From<PassedEvent> for TumblePassedEvent {
     }
 }
 
-/// Adds an event to a clip of a library: a moment such as a step or the throw of a ball, `tick` ticks after the clip's
-/// start, up to its length. Crowds that exist already do not have it.
+/// Adds an event to a clip of a library: a moment such as a step or the throw of a ball, `tick` ticks after the
+/// clip's start, up to its length. Crowds that were made before do not have the event.
 ///
 /// `name` may be null: then the event has none. Several events may have one name. `event` receives the event's index; it
 /// may be null.

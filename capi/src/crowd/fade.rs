@@ -28,7 +28,7 @@ pub struct TumbleCrowdFade {
     pub to: f32,
 }
 
-// SAFETY: `repr(C)`, the size is first, and zeros are numbers.
+// SAFETY: `repr(C)`, the size is the first member, and zero bits are valid numbers.
 unsafe impl SizedStructure for TumbleCrowdFade {
     const FIRST_SIZE: usize = size_of::<Self>();
 }

@@ -69,7 +69,7 @@ fn matched<'a>(
     if let Some(reason) = &motion.no_world {
         return Err(refused(format!("{name}: {reason}")));
     }
-    // The first set names the joints of a library of arrays.
+    // A library that was made of arrays has no names of joints until its first set gives them.
     let joints = match library.read()?.joint_names() {
         names if !names.is_empty() && !library.skeleton.is_named() => {
             Cow::Owned(library.skeleton.clone().with_names(names))
@@ -106,9 +106,9 @@ fn authored_vector_method(motion: &Motion, clip: usize) -> Result<VectorMethod, 
 ///
 /// Joints that the clip does not have stay at rest. The clip must not have joints that the library does not have.
 /// `clip_of_file` is the index of the clip in the file, counted from 0. `interpolation` and `vectors` are as in
-/// `tumble_crowd_library_push`, but null stands for the methods of the file, which must be one method for all
-/// rotations, and one for all translations and scales. `clip` receives the clip's index in the library, counted from
-/// 0; it may be null.
+/// `tumble_crowd_library_push`, but null stands for the methods of the file. All rotations of the file must then
+/// have one method, and all translations and scales must have one. `clip` receives the clip's index in the library,
+/// counted from 0; it may be null.
 ///
 /// # Errors
 /// - `TUMBLE_RESULT_OUT_OF_RANGE` if there is no such clip.

@@ -36,7 +36,7 @@ pub struct TumbleCrowdLayer {
     pub mask: usize,
 }
 
-// SAFETY: `repr(C)`, the size is first, and zeros are numbers.
+// SAFETY: `repr(C)`, the size is the first member, and zero bits are valid numbers.
 unsafe impl SizedStructure for TumbleCrowdLayer {
     const FIRST_SIZE: usize = size_of::<Self>();
 }

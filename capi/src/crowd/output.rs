@@ -52,7 +52,7 @@ unsafe fn vectors<'a, T: Number>(
         );
         return Err(Failure::new(TumbleResult::WrongSize, message));
     }
-    // SAFETY: the caller's promise.
+    // SAFETY: as the caller promises.
     let output = unsafe { list_mut(output, count, "output")? };
     Ok(output.as_chunks_mut::<4>().0)
 }
@@ -195,7 +195,7 @@ unsafe fn wait<T: Number>(
         let is_half = submitted.is_half;
         return Err(CrowdError::Precision { is_half }.into());
     }
-    // SAFETY: the caller's promise.
+    // SAFETY: as the caller promises.
     let output = unsafe { vectors(&state.inner, submitted, output, count)? };
     Ok(take(&mut state.inner, output)?)
 }

@@ -73,7 +73,7 @@ pub unsafe extern "C" fn tumble_crowd_new(
     })
 }
 
-/// Sets what layers of instances play from now on. `layers` is an array of `count` changes.
+/// Sets the clips that layers of instances play from now on. `layers` is an array of `count` changes.
 ///
 /// A fade of a layer that is set ends. If two changes are for one layer, the later one counts. The changes, at most
 /// 20 bytes each, reach the device with the next evaluation.
@@ -106,7 +106,7 @@ pub unsafe extern "C" fn tumble_crowd_set(
     })
 }
 
-/// Returns what a layer of an instance plays, with its current time. Speed and weight are the rounded ones.
+/// Returns the clip that a layer of an instance plays, with its current time and its rounded speed and weight.
 ///
 /// The caller sets `layer->size`, `layer->instance` and `layer->layer`; the call writes the other members.
 ///

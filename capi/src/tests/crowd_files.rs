@@ -255,7 +255,7 @@ fn clips_of_a_file_that_move_different_joints_share_a_library() {
     let (arrays, _) = libraries();
     let pushed = push_clip(arrays, other, 0, null(), None);
     fails(pushed, TumbleResult::InvalidInput, "clip 0 has a joint");
-    // In a library of its own, it plays as the file states.
+    // In a separate library, this clip plays as the file states.
     let of_other = library_of(other);
     done(push_clip(of_other, other, 0, null(), None));
     same(
@@ -404,7 +404,7 @@ fn files_without_a_hierarchy_of_their_own_are_roots_or_refused() {
     done(unsafe { tumble_crowd_library_parents(library, parents.as_mut_ptr(), 4) });
     assert_eq!(parents, [-1; 4]);
     let mut null_library = null_mut();
-    // SAFETY: places that are refused, and one that is not.
+    // SAFETY: null pointers, which are refused, and room for a handle.
     unsafe {
         let made = tumble_crowd_library_of_file(file, 0, null_mut());
         fails(made, TumbleResult::InvalidPointer, "`library` is null");

@@ -83,14 +83,14 @@ impl FromStr for DeviceChoice {
 pub(crate) struct OpenedDevice {
     pub(crate) engine: Engine,
     pub(crate) label: String,
-    /// The device was chosen automatically: the CPU may replace it, with the same bits.
+    /// Whether the device was chosen automatically: the CPU, which gives the same bits, may then replace it.
     automatic: bool,
     /// Each job goes to the device that is fastest for it.
     by_cost: Option<ByCost>,
 }
 
-/// The CPU evaluates fewer rotations than this sooner than another device opens: the rule of
-/// [`Engine::auto`], repeated here so that small jobs load no driver.
+/// The CPU evaluates fewer rotations than this before another device has opened. The rule is that of [`Engine::auto`];
+/// it is repeated here so that small jobs load no driver.
 const MIN_GPU_ROTATIONS: usize = 1 << 20;
 
 /// Chooses the device of each job by its size.

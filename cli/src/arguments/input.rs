@@ -63,7 +63,7 @@ impl Inputs {
         self.gather_with(times_from_stdin, Repeats::Once)
     }
 
-    /// The paths of the inputs, for commands that compare an input with itself where it is named twice.
+    /// The paths of the inputs, with repetitions: if an input is named twice, the command compares it with itself.
     pub(crate) fn with_repeats(&self) -> Result<Vec<PathBuf>, Failure> {
         Ok(self.gather_with(false, Repeats::Keep)?.paths())
     }
@@ -96,7 +96,8 @@ impl Inputs {
         let gathered = GatheredInputs::new(&self.paths, &selection)?;
         let paths = gathered.paths();
         self.check_formats(&paths.iter().collect::<Vec<_>>())?;
-        // A thread may read the inputs; warnings about the robot are those of the command.
+        // Read the robot's file now, so that its warnings belong to the command and not to the input that a thread
+        // reads first.
         self.reading.robot()?;
         Ok(gathered)
     }
@@ -161,12 +162,12 @@ impl Inputs {
         &self.paths
     }
 
-    /// As [`Inputs::gather`], the paths alone.
+    /// As [`Inputs::gather`], but only the paths.
     pub(crate) fn distinct(&self, times_from_stdin: bool) -> Result<Vec<PathBuf>, Failure> {
         Ok(self.gather(times_from_stdin)?.paths())
     }
 
-    /// Reads a keyframe file, and warns of what is in it.
+    /// Reads a keyframe file, and prints its warnings.
     pub(crate) fn load(&self, path: &Path) -> Result<Loaded, Failure> {
         let loaded = self.load_quietly(path)?;
         loaded.warnings.iter().cloned().for_each(words::warn_of);
@@ -275,11 +276,11 @@ pub(crate) struct OnlyClip {
     pub(crate) clip: Motion,
     /// The file, unless the clip was converted to another unit or up axis.
     pub(crate) document: Option<Arc<dyn Document>>,
-    /// Fails where other animations of the file were refused: the result is then incomplete.
+    /// An error if other animations of the file were refused: the result is then incomplete.
     pub(crate) rest: Result<(), Failure>,
 }
 
-/// Fails where animations of an input were refused; the others are done by then.
+/// Returns an error if animations of an input were refused. It is called when the work on the other animations is done.
 pub(crate) fn check_complete(name: &str, loaded: &Loaded) -> Result<(), Failure> {
     let refused: u64 = loaded.refused.iter().map(|fault| fault.count).sum();
     if refused == 0 {
@@ -332,7 +333,7 @@ pub(crate) fn several_clips_failure(path: &Path, loaded: &Loaded) -> Failure {
 /// Files to work on, in order, each once.
 pub(crate) struct GatheredInputs {
     pub(crate) files: Vec<FoundInput>,
-    /// The command line has a directory, a pattern or a list: there may be any number of files.
+    /// Whether the command line has a directory, a pattern or a list, so that there may be any number of files.
     pub(crate) many: bool,
     /// Skipped entries of directories that are named like inputs: pipes, sockets, links in a circle.
     pub(crate) skipped: Vec<InputEntry>,
@@ -409,7 +410,7 @@ pub(crate) enum Repeats {
     /// They are processed once, with a warning.
     #[default]
     Once,
-    /// They are inputs as often as they are named.
+    /// A file is an input as often as it is named.
     Keep,
 }
 
@@ -469,7 +470,7 @@ struct Expansion {
     found: Vec<FoundInput>,
     /// The number of inputs that `--exclude` leaves out. The files of a directory count only if none of them is left.
     excluded: usize,
-    /// The path is a pattern that no file matches.
+    /// Whether the path is a pattern that no file matches.
     is_unmatched: bool,
 }
 
@@ -493,7 +494,7 @@ impl FoundInput {
         }
     }
 
-    /// The same, whose result lies below the directory of results as it lies below `base`.
+    /// The same input, with a result at the same path below the directory of results as the input has below `base`.
     ///
     /// # Errors
     /// When it does not lie below `base`.
@@ -518,7 +519,8 @@ impl FoundInput {
 }
 
 impl FoundInput {
-    /// Whether it, or a directory above it in the directory that was named, is a symbolic link.
+    /// Whether the file is a symbolic link, or a directory above it is, up to the directory that the command line
+    /// names.
     fn is_below_link(&self) -> bool {
         let root = self.root.as_deref();
         let mut above = self.path.ancestors();
@@ -619,8 +621,8 @@ impl GatheredInputs {
         Ok(gathered)
     }
 
-    /// Keeps the path without symbolic links of a file that was found several times, in whatever order, and warns about
-    /// the others.
+    /// For each file that was found several times, in any order, keeps the path without symbolic links, and warns about
+    /// the other paths.
     fn settle(&mut self, repeated: Vec<(usize, FoundInput)>) {
         const LISTED: usize = 3;
         let count = repeated.len();
@@ -651,8 +653,8 @@ impl GatheredInputs {
         self.files.iter().map(|found| found.path.clone()).collect()
     }
 
-    /// The inputs that a path stands for. Files that are named or that match a pattern are left out by their paths as
-    /// they are given, those in directories by their paths below the directory.
+    /// The inputs that a path stands for. Exclusions are compared with the path as written for files that are named or
+    /// match a pattern, and with the path below the directory for files in directories.
     fn expand(
         &mut self,
         path: &Path,
@@ -771,7 +773,7 @@ impl GatheredInputs {
     }
 }
 
-/// The inputs below a directory that `--exclude` leaves out, where it leaves out all.
+/// The number of inputs below a directory, for the message that `--exclude` leaves out all of them.
 fn count_inputs(directory: &Path, selection: &InputSelection<'_>) -> usize {
     if selection.exclude.is_empty() {
         return 0;
@@ -789,7 +791,7 @@ enum UnreadableEntry {
     Input,
     /// It leads to nothing new; with the reason.
     Skipped(String),
-    /// Nothing that would be an input.
+    /// An entry that could not be an input.
     Other,
 }
 
@@ -878,7 +880,7 @@ fn read_list(list: &Path, is_null_separated: bool) -> Result<Vec<PathBuf>, Failu
     let lines = lines.filter(|line| !line.is_empty());
     let (comments, paths): (Vec<&[u8]>, Vec<&[u8]>) =
         lines.partition(|line| line.starts_with(b"#"));
-    // `ls` prints the names of files that begin so, too.
+    // A list that was written by `ls` may contain names of files that begin with `#`.
     let files = comments.iter().filter(|line| named(line).exists()).count();
     if files > 0 {
         let lines = words::count(files, "line");

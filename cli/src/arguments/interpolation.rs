@@ -111,8 +111,8 @@ impl InterpolationArguments {
         checked.map_err(|message| Failure::usage(format!("{name}: {message}")))
     }
 
-    /// Refuses `--signs` if no track takes it. A track with tangents, by a method that prescribes their signs,
-    /// does not.
+    /// Refuses `--signs` if it has no effect on any track. It has none on a track with tangents if the method
+    /// prescribes the signs of tangents.
     fn check_signs(self, methods: &[Method], clip: &Motion) -> Result<(), String> {
         let takes = |method: &Method| method.signs.is_none() || method.signs == self.signs;
         let has_tangents = clip.set.tracks().all(|track| !track.tangents.is_empty());
@@ -240,8 +240,8 @@ fn key_signs() -> impl TypedValueParser<Value = KeySigns> {
     one_of(KeySigns::ALL.map(|signs| (signs.name(), help(signs), signs)))
 }
 
-/// Where the curves of a set are less smooth than their method promises: the first such key is named, others
-/// are counted.
+/// A warning if curves of a set are less smooth at some keys than their method promises. It names the first such key
+/// and counts the others.
 pub(crate) fn curve_warning(
     name: &str,
     clip: &Motion,
@@ -284,8 +284,8 @@ fn names() -> impl Iterator<Item = PossibleValue> {
         .map(|method| PossibleValue::new(method.name).help(method.summary))
 }
 
-/// The methods among these that draw a clip differently: the method of a file that states none is
-/// bessel-overhauser, which is not drawn twice.
+/// The methods among these that draw a clip differently. A file that states no method has bessel-overhauser, which is
+/// then not drawn a second time.
 pub(crate) fn distinct_methods(methods: &[MethodChoice], clip: &Motion) -> Vec<MethodChoice> {
     if !clip.channels.is_empty() {
         return methods.to_vec();
@@ -318,7 +318,7 @@ impl CurveChoice {
         }
     }
 
-    /// The same curve, of which another quantity is evaluated.
+    /// The same curve, with another quantity.
     pub(crate) fn of(self, quantity: Quantity) -> Self {
         Self { quantity, ..self }
     }

@@ -1,7 +1,7 @@
-//! The options of a command line: which are explicit, the values of all, and, for the commands that write
-//! results, a row of [`OPTIONS`] each. It is all that the program knows of an option besides its value: whether
-//! it determines the bytes of results, and which inputs or results it applies to. An option that has no effect
-//! is refused, with a remedy, and never ignored. Manifests record those that determine bytes, by their names.
+//! The options of a command line: which are explicit, and the values of all. For the commands that write results, each
+//! option has a row in [`OPTIONS`]: whether it determines the bytes of results, and which inputs or results it applies
+//! to. An option that has no effect is refused, with a remedy, and never ignored. Manifests record the options that
+//! determine bytes, by their names.
 
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
@@ -32,8 +32,8 @@ pub(crate) struct OptionRule {
 /// The part of an option on which the bytes of a result depend.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Bytes {
-    /// Nothing: it says where inputs and results are, what is permitted, which device computes, or what is
-    /// reported. Times may come from standard input, so the commands that read them add their hash.
+    /// No part: the option names the places of inputs and results, permits something, selects the device, or controls
+    /// reports. Times may come from standard input, so the commands that read them add their hash.
     Unchanged,
     /// Its value.
     ByValue,
@@ -43,7 +43,8 @@ pub(crate) enum Bytes {
 
 /// The inputs or results to which an option applies.
 pub(crate) enum AppliesTo {
-    /// Everything that its command does; combinations that depend on values are refused where these are used.
+    /// All inputs and results of its command. Combinations that depend on values are refused by the code that uses the
+    /// values.
     All,
     /// Inputs of formats that take it.
     Inputs(FormatOption),
@@ -287,7 +288,7 @@ pub(crate) const OPTIONS: &[OptionRule] = &[
     deciding("meshopt"),
 ];
 
-/// The names of options in manifests of before, as the text of a command begins, and the names since.
+/// Options that have been renamed: the command (as its text in a manifest begins), the old name and the new name.
 const RENAMED: &[(&str, &str, &str)] = &[
     ("", "output", "quantity"),
     ("", "path", "signs"),
@@ -387,7 +388,7 @@ pub(crate) fn rule(name: &str) -> Option<&'static OptionRule> {
 }
 
 impl ResultDescription<'_> {
-    /// Why an option has no effect, where `applies` is false.
+    /// The reason why an option has no effect, if `applies` is false.
     fn unless(&self, applies: bool, option: &str, wants: &str) -> Option<String> {
         (!applies).then(|| {
             format!(
@@ -530,8 +531,8 @@ impl CommandLine {
         self.explicit.contains(option)
     }
 
-    /// Refuses the first of these options, `(id, name)`, that the command line names: it has no effect. `on` says
-    /// on what, and `remedy` what to do.
+    /// Refuses the first of these options, `(id, name)`, that the command line names, because it would have no effect
+    /// on `on`. `remedy` says what to do.
     pub(crate) fn refuse(
         &self,
         options: &[(&str, &str)],
@@ -562,7 +563,7 @@ impl CommandLine {
         self.refuse(&options, on, remedy)
     }
 
-    /// Refuses the options of curves through rotations where there are none.
+    /// Refuses the options of curves through rotations if there are none.
     pub(crate) fn refuse_rotation_options(&self, on: &str) -> Result<(), Failure> {
         let remedy = "it is for rotations; leave it out, or see --path-frame and --path-method";
         self.refuse(&[("methods", "--method")], on, remedy)?;
@@ -640,8 +641,8 @@ pub(crate) struct OptionFile {
     pub(crate) sha256: String,
 }
 
-/// The hash of a file; empty where it cannot be read again, as standard input. That of the models in a folder of
-/// body models.
+/// The hash of a file; empty if it cannot be read again, as standard input. For a folder of body models, the hash of
+/// the models in it.
 pub(crate) fn content(file: &str) -> String {
     if Path::new(file).is_dir() {
         return digest::of_folder(Path::new(file), "npz");

@@ -134,7 +134,7 @@ pub(crate) struct RobotReport {
     /// The names of the joints, in the order of the result.
     joints: Vec<String>,
     joint_order: &'static str,
-    /// The names of the bodies; absent where the dialect has none.
+    /// The names of the bodies; absent if the dialect has none.
     #[serde(skip_serializing_if = "Option::is_none")]
     bodies: Option<Vec<String>>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -143,7 +143,7 @@ pub(crate) struct RobotReport {
     #[serde(skip_serializing_if = "Vec::is_empty")]
     merged_bodies: Vec<String>,
     siblings: &'static str,
-    /// The order of quaternions; absent where the dialect has none.
+    /// The order of quaternions; absent if the dialect has none.
     #[serde(skip_serializing_if = "Option::is_none")]
     quaternion: Option<&'static str>,
     velocities: &'static str,
@@ -249,7 +249,8 @@ impl DialectArguments {
         }
     }
 
-    /// The robot whose bodies a dialect has: that of the file, or without its fixed bodies.
+    /// The robot with the bodies that a dialect stores: the robot of the file, or the one whose fixed bodies are merged
+    /// into others.
     pub(crate) fn robot_of<'a>(
         &self,
         dialect: &WrittenDialect,
@@ -330,7 +331,8 @@ impl DialectArguments {
             LimitRule::Report => "their values are kept (--limits clamp changes them)",
             LimitRule::Refuse => "--limits report keeps their values",
         };
-        // In degrees, a pose that every joint can have is turns outside.
+        // If the file's angles are degrees but are read as radians, even an ordinary pose exceeds its limits by whole
+        // turns.
         let is_circles_away = |excess: &&LimitExcess| excess.unit == "rad" && excess.excess > TAU;
         let doubt = match 2 * excesses.iter().filter(is_circles_away).count() > excesses.len() {
             true => "; by more than a turn: are the file's angles in degrees?",
@@ -345,7 +347,8 @@ impl DialectArguments {
         (!joints.is_empty()).then(text)
     }
 
-    /// Applies the rule for limits to the scalars of a clip at samples, `[sample][scalar]`; `rates` are how fast they change.
+    /// Applies the rule for limits to the scalars of a clip at samples, `[sample][scalar]`; `rates` are their
+    /// velocities.
     pub(crate) fn limit_scalars(
         &self,
         work: &ClipWork,
@@ -451,8 +454,8 @@ impl DialectArguments {
     }
 }
 
-/// The name of a clip that has none: that of the result's file up to the first point, by which loaders look clips up, or
-/// of the input's if the result is on standard output.
+/// The name for a clip without a name: the name of the result's file up to the first point, because loaders find clips
+/// by this name; if the result is written to standard output, the name of the input's file.
 fn name_of_file(work: &ClipWork) -> String {
     let file = match names::is_standard(work.target.path()) {
         true => work.path(),

@@ -67,10 +67,11 @@ pub(crate) enum RateChoice {
     Number(FrameRate),
 }
 
-/// The lowest rate of keys that is one of frames. Keys that are further apart are those of a person, or of a slow log.
+/// The lowest rate of keys that is taken for a frame rate. Keys that are further apart were set by a person, or come
+/// from a slow log.
 const MIN_SOURCE_RATE: f64 = 10.0;
 
-/// The rate of frames where the keys have none.
+/// The rate of frames if the keys have no rate.
 const DEFAULT_RATE: u64 = 25;
 
 const SOURCE: &str = "source";
@@ -131,7 +132,7 @@ pub(crate) enum SampleChoice {
         rate: RateChoice,
         start: Option<f64>,
         end: Option<f64>,
-        /// Start at 0 where the first key is later.
+        /// Start at 0 if the first key is later.
         from_zero: bool,
     },
     Times(Vec<f64>),
@@ -189,7 +190,7 @@ pub(crate) struct EndFrameArguments {
 }
 
 impl EndFrameArguments {
-    /// Whether the command line says it.
+    /// Whether the command line sets it.
     pub(crate) fn is_chosen(&self) -> bool {
         self.end_frame.is_some()
     }
@@ -234,11 +235,11 @@ fn end_frame() -> impl TypedValueParser<Value = EndFrame> {
 pub(crate) struct ClipFrames {
     /// The times at which it is evaluated.
     pub(crate) frames: SampleTimes,
-    /// The times written with the results, where those differ: a key is held there.
+    /// The times written with the results, if they differ from `frames`: in gaps, a key is held.
     held: Option<SampleTimes>,
     /// The sample at the end of the clip, after its frames.
     pub(crate) end: Option<EndSample>,
-    /// The seconds from the last frame to the end of the clip, where nothing follows the last frame.
+    /// The seconds from the last frame to the end of the clip, if no sample follows the last frame.
     pub(crate) left_out: Option<f64>,
     /// The rate of which all written times are neighbouring frames.
     pub(crate) rate: Option<FrameRate>,
@@ -359,8 +360,8 @@ impl SamplingArguments {
 }
 
 impl SampleChoice {
-    /// The same, with frames halfway between keys where `--fps` is that of the input: a curve is compared where it is
-    /// no key.
+    /// The same, but with frames halfway between keys if `--fps` is the rate of the input, because the curve must be
+    /// compared between keys, too.
     pub(crate) fn and_halves(mut self) -> Self {
         if let Self::Rate { rate, .. } = &mut self
             && *rate == RateChoice::Source
@@ -394,8 +395,8 @@ impl SampleChoice {
         }
     }
 
-    /// Where the frames of a rate end in a clip, in seconds: at its last key or where the command line says; `None` for
-    /// listed times, or where neither is known.
+    /// The end of the frames of a rate in a clip, in seconds: the end that the command line sets, otherwise the last
+    /// key. `None` for listed times, or if there is neither.
     pub(crate) fn end_of(&self, clip: &Motion, outside: Outside) -> Option<f64> {
         let Self::Rate { end, .. } = *self else {
             return None;
@@ -408,7 +409,7 @@ impl SampleChoice {
     /// The samples for one clip; warns when they exceed its keys, and of those in gaps.
     ///
     /// # Errors
-    /// When one is in a gap, and such are refused.
+    /// When a sample is in a gap, and samples in gaps are refused.
     pub(crate) fn of_clip(
         &self,
         clip: &Motion,
@@ -491,8 +492,8 @@ impl SampleChoice {
     /// The samples for one clip; warns when they exceed its keys.
     ///
     /// # Errors
-    /// When the clip has none of the times: of those of another file, or where times outside its keys are left
-    /// out.
+    /// When no time is left: if the times of another file are all outside the clip, or if times outside its keys are
+    /// left out.
     pub(crate) fn of(
         &self,
         clip: &Motion,
@@ -611,8 +612,8 @@ pub(crate) fn finite_seconds(text: &str) -> Result<f64, String> {
 
 /// Parses the difference of two clocks.
 pub(crate) fn clock_difference(text: &str) -> Result<f64, String> {
-    /// Two clocks that count seconds, one from 1970 and one from the start of a recording, are not further apart: it
-    /// is the year 5138.
+    /// The largest difference of two clocks that count seconds, one from 1970 and one from the start of a recording:
+    /// 1970 to the year 5138.
     const LARGEST: f64 = 1e11;
     match finite_seconds(text)? {
         difference if difference.abs() <= LARGEST => Ok(difference),

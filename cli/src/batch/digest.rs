@@ -36,7 +36,7 @@ impl Digest {
 /// before and after reading, so that the hash is that of the evaluated bytes.
 pub(crate) struct InputFile {
     path: PathBuf,
-    /// Its identity before reading; `None` where it cannot be read twice, as standard input and pipes.
+    /// Its identity before reading; `None` if it cannot be read twice, as standard input and pipes.
     before: Option<Identity>,
     /// The files that it refers to, relative to its folder, with their identities.
     referred: Vec<(PathBuf, Option<Identity>)>,
@@ -71,7 +71,7 @@ impl InputFile {
         &self.path
     }
 
-    /// Its length with that of the files that it refers to; `None` where it cannot be read twice.
+    /// Its length with that of the files that it refers to; `None` if it cannot be read twice.
     pub(crate) fn bytes(&self) -> Option<u64> {
         let others = self
             .referred
@@ -81,9 +81,9 @@ impl InputFile {
         Some(all.map(|identity| identity.bytes).sum())
     }
 
-    /// Its hash, if it can be read twice. A file that cannot be read is reported when it is opened. That of an input
-    /// of one file is the SHA-256 of its bytes; of several files it is that of a list as `sha256sum` prints it: the
-    /// hash and the name of each, the input first.
+    /// The input's hash, if it can be read twice. A file that cannot be read is reported when it is opened. If the
+    /// input is one file, the hash is the SHA-256 of its bytes. If it is several files, it is the SHA-256 of a list as
+    /// `sha256sum` prints it: the hash and the name of each file, the input first.
     pub(crate) fn sha256(&self) -> Option<&str> {
         let hash = || {
             self.before.as_ref()?;

@@ -55,7 +55,7 @@ pub(crate) struct ManifestEntry {
 /// Assumptions about the frames of a result, and times that they leave out, in a manifest and in JSON.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct FrameNotes {
-    /// The frames a second, where they were assumed, because the keys have no rate.
+    /// The frames per second, if they were assumed because the keys have no rate.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) assumed_fps: Option<String>,
     /// The seconds from the last frame to the end of the clip, where nothing follows the last frame.
@@ -79,10 +79,10 @@ pub(crate) struct InputEntry {
     pub(crate) state: InputState,
     /// As on the command line.
     pub(crate) input: String,
-    /// The result that it has, or would have; `None` where it can have no name.
+    /// The result that it has, or would have; `None` if no name for it is possible.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) result: Option<String>,
-    /// The exit code of a command that has this input alone.
+    /// The exit code of a command that has only this input.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) code: Option<u8>,
     /// Why it failed or was skipped.
@@ -97,7 +97,7 @@ pub(crate) struct InputEntry {
     /// The warnings about the input and those of its animations that failed.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub(crate) warnings: Vec<RecordedWarning>,
-    /// The command that processes it, where that is not `tumble eval`.
+    /// The command that processes it, if this is not `tumble eval`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) command: Option<String>,
 }
@@ -160,7 +160,7 @@ impl InputEntry {
         }
     }
 
-    /// The entry in a line; `None` where there is none, or where it names a result outside its directory.
+    /// The entry in a line; `None` if the line is not an entry, or if it names a result outside its directory.
     pub(crate) fn of_line(line: &[u8]) -> Option<Self> {
         let entry: Self = serde_json::from_slice(line).ok()?;
         entry
@@ -181,8 +181,7 @@ impl InputEntry {
         self.command.as_deref().unwrap_or(options::DEFAULT_COMMAND)
     }
 
-    /// The key that entries of one input share: its result, or else its name behind a character that no result
-    /// begins with.
+    /// The key that all entries of one input share: its result, or else `/` (with which no result begins) and its name.
     pub(crate) fn key(&self) -> String {
         let by_input = || Self::key_by_input(&self.input);
         self.result.clone().unwrap_or_else(by_input)
@@ -202,7 +201,7 @@ impl InputEntry {
 pub(crate) type InputEntries = BTreeMap<String, InputEntry>;
 
 impl ManifestEntry {
-    /// The entry in a line; `None` where there is none, or where it names a result outside its directory.
+    /// The entry in a line; `None` if the line is not an entry, or if it names a result outside its directory.
     pub(crate) fn of_line(line: &[u8]) -> Option<Self> {
         let mut entry: Self = serde_json::from_slice(line).ok()?;
         if let Cow::Owned(options) = with_present_names(&entry.options) {
@@ -238,7 +237,7 @@ impl ManifestEntry {
         self.input_sha256.as_deref() == Some(input_sha256) && self.is_made_with(options)
     }
 
-    /// Whether it is a table with rows of many inputs, of which the manifest names the directory.
+    /// Whether it is a table with rows of many inputs; the manifest then names the directory of these inputs.
     pub(crate) fn is_of_directory(&self) -> bool {
         self.options.ends_with(" into=parquet")
     }
@@ -254,7 +253,7 @@ impl ManifestEntry {
     }
 }
 
-/// The SHA-256 of all kernels' SPIR-V, one behind the other.
+/// The SHA-256 of the SPIR-V of all kernels, one after the other.
 pub(crate) fn kernels_sha256() -> &'static str {
     static HASH: LazyLock<String> =
         LazyLock::new(|| digest::of_bytes(tumble::vulkan::kernels().map(|(_, code)| code)));
@@ -290,8 +289,8 @@ pub(crate) struct UnfinishedInputs<'a> {
 }
 
 impl ManifestLines {
-    /// A last line without its end was being written when the program was killed: the batch has not come to its end,
-    /// and the inputs that it had yet to evaluate have lines before it.
+    /// Parses the lines. A last line without a line end was being written when the program was killed. It is not
+    /// needed: the batch has not ended, and all inputs that it had yet to evaluate have lines before this one.
     pub(crate) fn parse(bytes: &[u8]) -> Self {
         let mut lines = Self {
             entries: BTreeMap::new(),
@@ -357,7 +356,7 @@ impl ManifestLines {
             .collect();
         let mut pending: BTreeSet<&str> =
             in_state(InputState::Pending).map(|it| &*it.input).collect();
-        // A batch was stopped between the clips of an input.
+        // An input is pending, too, if some of its clips have no result: the batch was stopped between these clips.
         let mut clips: BTreeMap<(&str, usize), (usize, &str)> = BTreeMap::new();
         for entry in self.entries.values() {
             clips.entry(entry.whole()).or_insert((0, &entry.input)).0 += 1;
@@ -375,7 +374,7 @@ impl ManifestLines {
     }
 }
 
-/// Opens the manifest of a directory; `None` where there is none.
+/// Opens the manifest of a directory; `None` if there is none.
 ///
 /// # Errors
 /// When it is a link, not a regular file, or not a manifest.

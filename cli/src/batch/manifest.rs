@@ -1,15 +1,15 @@
-//! The manifest of a directory of results: what each was made from and how, and its
-//! hash; and the inputs that have no result, or not all. One JSON object a line.
+//! The manifest of a directory of results. It has a JSON object per line: for each result, its input, its options and
+//! its hash; and for each input without a result, or without all of its results, its state.
 //!
-//! A batch begins with a line for each input that it will evaluate (`pending`), so that a batch that did not
-//! come to its end is known by them. While it runs, a line is added for each result before the result is
-//! renamed (a file that does not match its line is to be made again), and for each input that failed. At the
-//! end the lines are sorted and the file is replaced, so that a batch that was stopped and resumed ends with
-//! the bytes of one that was not.
+//! A batch begins with a line for each input that it will evaluate (`pending`). By these lines, a batch that did not
+//! end is recognised. While the batch runs, a line is added for each input that failed, and for each result. The line
+//! of a result is added before the file gets its name. So a file that does not match its line must be made again. At
+//! the end the lines are sorted and the file is replaced. So the manifest has the same bytes whether or not the batch
+//! was stopped and resumed.
 //!
-//! A file is a manifest if its first line is an entry; any other file of its name is refused unless
-//! files may be replaced. Lines are added only to a file that this batch has created: hard links to an
-//! older one keep its bytes.
+//! A file is a manifest if its first line is an entry; any other file of this name is refused unless files may be
+//! replaced. Lines are added only to a file that this batch has created, because hard links to an older file must keep
+//! their bytes.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{File, TryLockError};
@@ -48,18 +48,18 @@ pub(crate) struct Manifest {
     planned: PlannedResults,
     /// Whether results without an input are removed.
     prune: bool,
-    /// Whether there is a file of its name: a manifest, or a file to replace.
+    /// Whether a file with the manifest's name exists: a manifest, or a file to replace.
     exists: bool,
     /// The file to which lines are appended; `None` before the first line is written.
     journal: Option<File>,
-    /// Whether there are shards, whose lines become part of it.
+    /// Whether there are shards, whose lines become part of the manifest.
     has_shards: bool,
-    /// Locks the directory: two batches would lose each other's lines.
+    /// Locks the directory, because two batches would lose each other's lines.
     _lock: Option<File>,
 }
 
-/// The results of a batch's inputs, each of all clips of its input: they decide which earlier results have no input
-/// any more.
+/// The results that a batch plans, one for all clips of each input. They decide which earlier results have no input any
+/// more.
 #[derive(Default)]
 pub(crate) struct PlannedResults {
     names: BTreeSet<String>,
@@ -97,8 +97,8 @@ impl PlannedResults {
             .is_some_and(|planned| planned != result && ending(planned) == ending(result))
     }
 
-    /// Whether a result has no input any more: the input is gone, has other clips than before, or its result has
-    /// another name now. `is_made`: the batch has made it. `previous` are the results before the batch.
+    /// Whether a result has no input any more: the input was removed, has other clips than before, or its result has
+    /// another name now. `is_made`: whether this batch made the result. `previous` are the results before the batch.
     pub(super) fn is_orphan(
         &self,
         entry: &ManifestEntry,
@@ -141,7 +141,7 @@ pub(crate) struct ManifestOptions {
     pub(crate) prune: bool,
 }
 
-/// Locks a directory of results; `None` where the system or the file system has no such locks.
+/// Locks a directory of results; `None` if the system or the file system has no such locks.
 pub(crate) fn lock(folder: &Folder) -> Result<Option<File>, Failure> {
     let Ok(file) = folder.to_lock() else {
         return Ok(None);
@@ -233,7 +233,8 @@ impl Manifest {
         self.append(&text)
     }
 
-    /// Appends a line that the fields have already.
+    /// Appends a line. Its entry must be in the fields already, because the first line is written with the lines of all
+    /// entries.
     fn append(&mut self, text: &str) -> Result<(), Failure> {
         match &mut self.journal {
             Some(journal) => {
@@ -294,7 +295,7 @@ impl Manifest {
         self.forget_shards()
     }
 
-    /// Says what results have that are not of this batch.
+    /// Prints a note about results that are not of this batch.
     fn note_orphans(&self, outputs: &[&String], possession: &str) {
         if let Some(first) = outputs.first() {
             let results = words::count(outputs.len(), "result");
@@ -317,7 +318,7 @@ impl Manifest {
         orphans.map(|entry| entry.output.clone()).collect()
     }
 
-    /// Says which results `--prune` keeps because it cannot know whether their inputs are gone.
+    /// Prints which results `--prune` keeps because it is not known whether their inputs were removed.
     fn note_unknown(&self) {
         let results = self.results().into_values();
         let unknown = results.filter(|entry| {
@@ -377,7 +378,7 @@ impl Manifest {
         Ok(removed)
     }
 
-    /// Replaces the file whole, without the lines of some results; gives it, open at its end.
+    /// Replaces the whole file by one without the lines of some results; returns the new file, open at its end.
     fn replace(&self, without: &BTreeSet<String>) -> Result<Option<File>, Failure> {
         let output = Output::create_in(&self.opened, Path::new(NAME), self.exists, "");
         let mut output = output.map_err(|error| Failure::output(&error))?;
@@ -403,7 +404,7 @@ impl Manifest {
         }
     }
 
-    /// Refuses to go on if the directory was moved or replaced: its results are not where they are looked for.
+    /// Refuses to continue if the directory was moved or replaced, because its results would not be found.
     fn check_in_place(&self) -> Result<(), Failure> {
         match self.opened.is_in_place() {
             true => Ok(()),
@@ -423,7 +424,7 @@ impl Manifest {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum InputPresence {
     Present,
-    /// It is gone from the directory that it was found in.
+    /// The directory in which it was found no longer contains it.
     Removed,
     /// It was not found. Its path may be one of another machine, of a disk that is not mounted, or relative to another
     /// directory.
@@ -446,11 +447,12 @@ impl InputPresence {
         )
     }
 
-    /// Whether the input with this path, whose result has this name, is present. It is gone if the directory that the
-    /// command line named is there and has other files: the input's path without the part that the name of its result
-    /// repeats. For a path below the current directory, such as `walks/a.bvh` in a list of inputs, that is the first
-    /// folder. For a name alone it is unknown, because every directory may be the one that it was in. A directory in the
-    /// place of a file, unless `may_be_folder` is set, is not the input.
+    /// Whether the input with this path, whose result has this name, is present. If it is not found, it counts as
+    /// removed if the directory that the command line named still exists and has other files. This directory is the
+    /// input's path without the part that the name of its result repeats. For a path below the current directory, such
+    /// as `walks/a.bvh` in a list of inputs, it is the first folder of the path. For a name without a directory the
+    /// answer is unknown, because any directory may have contained it. A directory in the place of a file is not the
+    /// input, unless `may_be_folder` is set.
     fn of(input: &str, result: Option<&str>, may_be_folder: bool) -> Self {
         let path = Path::new(input);
         let is_missing = || match std::fs::symlink_metadata(path) {
@@ -669,7 +671,8 @@ mod tests {
         assert_eq!(text(&path).lines().count(), 3);
     }
 
-    /// A manifest is written again with every batch: its numbers stay, and lines of before have none.
+    /// Every batch writes the manifest again. The numbers in it must not change, and older lines do not have such
+    /// numbers.
     #[test]
     fn notes_about_frames_are_read_as_they_were_written() {
         let mut noted = entry("a", "1");

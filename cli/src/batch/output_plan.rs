@@ -1,5 +1,5 @@
-//! Plans where results go, before any work: one file, or a directory with a file for each input, where the
-//! check is that no file of another owner is replaced.
+//! Plans where results go, before any work: one file, or a directory with a file for each input. In a directory, no
+//! file of another owner is replaced.
 //!
 //! An input whose result cannot have a name or a file there has failed; the others are evaluated.
 

@@ -25,8 +25,9 @@ impl From<&ManifestEntry> for Owner {
 }
 
 impl Owner {
-    /// Whether this is an input: by its path, or, where there is no file of that path any more, by its bytes, as of a
-    /// file that was moved. Another file with the same bytes is another input: its result may have other options.
+    /// Whether the file at `path` is this input. It is if the paths are equal, or, if there is no file at the old path
+    /// any more, if the bytes are equal: then the file was moved. As long as both files exist, they are different
+    /// inputs, because their results may have other options.
     fn is(&self, path: &Path) -> bool {
         let real = |path: &Path| path.canonicalize().ok();
         let input = Path::new(&self.input);
@@ -45,9 +46,9 @@ impl Owner {
 
 /// The commands that made the results of a directory.
 pub(crate) struct CommandsOfResults<'a> {
-    /// Those of each result of all clips of an input.
+    /// The command of each result of all clips of an input.
     of_results: BTreeMap<&'a str, &'a str>,
-    /// Those of the inputs that have no result.
+    /// The commands of the inputs that have no result.
     others: BTreeSet<&'a str>,
 }
 

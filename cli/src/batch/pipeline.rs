@@ -1,4 +1,5 @@
-//! The way of a command's inputs: read ahead, evaluated one by one by the command, and kept.
+//! The steps of a command's inputs: they are read ahead, evaluated one by one by the command, and their results are
+//! kept.
 //!
 //! ```text
 //! while let Some(work) = pipeline.next_work() {
@@ -62,11 +63,11 @@ pub(crate) struct PipelineInputs {
 pub(crate) struct BatchOptions {
     /// Everything that determines a result besides its input.
     pub(crate) options: ResultOptions,
-    /// Results that are done are kept.
+    /// Whether results that are complete are kept.
     pub(crate) resume: bool,
-    /// Existing results are replaced, those of other inputs too.
+    /// Whether existing results are replaced, also those of other inputs.
     pub(crate) overwrite: bool,
-    /// Every result and every warning is printed.
+    /// Whether every result and every warning is printed.
     pub(crate) verbose: bool,
 }
 
@@ -82,7 +83,7 @@ pub(crate) struct EvaluatedResult {
 pub(crate) struct OpenInput {
     pub(crate) file: InputFile,
     pub(crate) loaded: Loaded,
-    /// When the command began with it.
+    /// The time when the command began with this input.
     pub(crate) started: Instant,
 }
 
@@ -98,7 +99,7 @@ pub(crate) struct ClipWork {
 }
 
 impl ClipWork {
-    /// ` (1.2 MB → 860.0 kB)`: the bytes of the input with its files, and of the result; nothing where the input's are
+    /// ` (1.2 MB → 860.0 kB)`: the bytes of the input with its files, and of the result; nothing if the input's are
     /// not known.
     pub(crate) fn sizes(&self, written: &WrittenFile) -> String {
         let size = |bytes: u64| words::bytes(bytes as f64);
@@ -121,8 +122,8 @@ impl ClipWork {
         }
     }
 
-    /// The name of the clips in results: with the name of the input's file alone, so that a file has the same results
-    /// wherever it is.
+    /// The name of the clips in results. It contains only the name of the input's file, not its directory, so that a
+    /// file has the same results in every directory.
     pub(crate) fn origin(&self) -> String {
         let input = names::input(self.path());
         let animation = self.name.strip_prefix(&*input).unwrap_or_default();
@@ -168,7 +169,7 @@ pub(crate) struct Pipeline<'a> {
     /// Nothing for a single result.
     batch: Option<BatchRecords<'a>>,
     outcomes: Outcomes,
-    /// The records of results and failures, where they are printed as JSON.
+    /// The records of results and failures, if they are printed as JSON.
     json: Option<Vec<Value>>,
 }
 
@@ -189,7 +190,7 @@ enum InputSource {
 /// A job whose input was read.
 struct ReadJob {
     job: PipelineJob,
-    /// `None` where its result exists and is complete.
+    /// `None` if its result exists and is complete.
     input: Option<(InputFile, Result<Loaded, Failure>)>,
 }
 
@@ -203,7 +204,7 @@ struct CurrentInput {
     failed: Vec<Failure>,
     /// The warnings so far: those of the input, and those about its clips.
     warnings: Vec<Warning>,
-    /// Those about clips that failed.
+    /// The warnings about clips that failed.
     of_failed: Vec<RecordedWarning>,
 }
 
@@ -212,19 +213,19 @@ struct BatchRecords<'a> {
     records: Box<dyn ResultRecorder + 'a>,
     summary: BatchSummary,
     progress: Progress,
-    /// A signal ends the batch at its next input; the batch then says how much is done.
+    /// A signal ends the batch at its next input; the batch then prints how much is done.
     _until_end: BatchGuard,
     options: ResultOptions,
     previous: PreviousEntries,
     overwrite: bool,
     inputs: usize,
-    /// The inputs that the batch has not come to, with the names of their results.
+    /// The inputs that the batch has not processed yet, with the names of their results.
     left: BTreeMap<PathBuf, String>,
     made: HashSet<String>,
-    /// The inputs with all their results, and those with some of them.
+    /// The number of inputs with all their results, and of inputs with some of them.
     done: usize,
     done_in_part: usize,
-    /// The inputs whose results were complete, and how many results these are.
+    /// The number of inputs whose results were complete before the batch, and the number of these results.
     skipped: usize,
     skipped_results: usize,
     failed: usize,
@@ -534,7 +535,8 @@ impl<'a> Pipeline<'a> {
         }
     }
 
-    /// A file of the input failed: the others go on, unless they would fail alike.
+    /// Records that a file of the input failed. The work on the others continues, unless they would fail in the same
+    /// way.
     fn fail(&mut self, failure: Failure) {
         let Some(current) = &mut self.current else {
             return;
@@ -858,7 +860,7 @@ struct ReadingAhead<R> {
 }
 
 impl<R: InputReader> ReadingAhead<R> {
-    /// Reads the inputs one by one; stops when the receiver is gone.
+    /// Reads the inputs one by one; stops when the receiver was dropped.
     fn read_all(&self, jobs: Vec<PipelineJob>, hand_over: &SyncSender<ReadJob>) {
         for job in jobs {
             let input = self.read(&job);
@@ -889,7 +891,7 @@ pub(crate) fn hash_before_reading(file: &InputFile, limits: Limits) -> Option<&s
     is_read.then(|| file.sha256()).flatten()
 }
 
-/// For an input with several clips whose result is one file of one clip.
+/// The remedy in the message about an input with several clips whose result is a file that can store only one.
 pub(super) const SEVERAL_CLIPS_REMEDY: &str = ", or give a directory for all of them: -o RESULTS/";
 
 /// A file to write: which of the input's clips go into it.
@@ -900,7 +902,7 @@ pub(super) struct ClipFile {
     pub(super) target: ResultTarget,
 }
 
-/// The files of an input whose result is `target`; a clip that can have none fails alone.
+/// The files of an input whose result is `target`. If a clip can have no file, only this clip fails.
 pub(super) fn clip_files(
     path: &Path,
     loaded: &Loaded,

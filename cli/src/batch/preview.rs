@@ -210,7 +210,7 @@ fn failed_before(lines: &ManifestLines) -> BTreeMap<String, String> {
 }
 
 impl PlannedWork<'_> {
-    /// The input, where it has several clips and the format has room for one.
+    /// The input, if it has several clips and the format can store only one.
     fn several_clips(&self, path: &Path, format: &Format) -> Result<Option<Loaded>, Failure> {
         if format.supports(Feature::SeveralClips) || !self.reader.may_have_several_clips(path) {
             return Ok(None);

@@ -1,4 +1,4 @@
-//! The name of each input's result in a directory of results, or why it can have none.
+//! The name of each input's result in a directory of results, or the reason why no name is possible.
 
 use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
@@ -12,7 +12,7 @@ use crate::batch::target::{self, choose};
 use crate::messages::exit::Failure;
 use crate::messages::{names, words};
 
-/// The path of an input's result below the directory of results, or why it has none.
+/// The path of an input's result below the directory of results, or the reason why it has none.
 pub(crate) type ResultName = Result<String, Failure>;
 
 /// The longest file name that file systems accept, in bytes.
@@ -32,8 +32,8 @@ pub(crate) fn format(
     choose(Path::new("-"), requested)
 }
 
-/// How results are named after their inputs. The name of a result depends on its input alone, so that it stays
-/// when other inputs appear beside it.
+/// How results are named after their inputs. The name of a result depends only on its input, so that it does not change
+/// when other inputs are added.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
 pub(crate) enum ResultNaming {
     /// walk.bvh becomes walk.npy
@@ -149,7 +149,7 @@ pub(crate) fn name_results(
     checked.collect()
 }
 
-/// Warns of results whose names differ in case alone: on file systems that ignore case they are one file.
+/// Warns of results whose names differ only in case, because they are one file on file systems that ignore case.
 pub(crate) fn warn_of_case(results: &[ResultName]) {
     let mut seen: HashMap<String, &str> = HashMap::new();
     let mut alike = results.iter().flatten().filter_map(|name| {

@@ -1,5 +1,5 @@
-//! Messages of a batch about its inputs: the lines of results and failures, as long as they are few, and a line for
-//! each code of a warning at the end, or every warning of a single input. Everything that is not printed is in the
+//! Messages of a batch about its inputs: lines for results and failures, if there are only a few, and at the end a line
+//! for each code of a warning. For a single input, every warning is printed. Everything that is not printed is in the
 //! manifest.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -25,7 +25,7 @@ const MAX_FAILURES: usize = 10;
 pub(crate) struct BatchSummary {
     /// Whether every warning is printed.
     prints_warnings: bool,
-    /// The lines about results that may yet be printed.
+    /// The number of further lines about results that may be printed.
     results_left: usize,
     failures_left: usize,
     warnings: BTreeMap<Code, WarnedInputs>,
@@ -37,7 +37,7 @@ pub(crate) struct BatchSummary {
     left_out: usize,
     /// Results with an assumed rate whose lines were not printed: their number, and the first rate.
     assumed: Option<(usize, String)>,
-    /// Failed inputs that have results of an earlier run: their number, and the first of these results.
+    /// The number of failed inputs that have results of an earlier run, and the first of these results.
     stale: Option<(usize, String)>,
 }
 
@@ -71,7 +71,8 @@ impl BatchSummary {
         }
     }
 
-    /// The line about a result, if it is to be printed. `assumed_fps` is the rate of a result whose input has none.
+    /// The line about a result, if it must be printed. `assumed_fps` is the rate that was assumed for an input without
+    /// a rate.
     pub(crate) fn result<'a>(
         &mut self,
         line: &'a str,
@@ -134,7 +135,7 @@ impl BatchSummary {
             });
     }
 
-    /// A failed input has a result of an earlier run, which stays.
+    /// Records that a failed input has a result of an earlier run, which is not removed.
     pub(crate) fn stay(&mut self, result: &Path) {
         let first = || (0, printable_path(result));
         self.stale.get_or_insert_with(first).0 += 1;

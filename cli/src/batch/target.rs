@@ -249,7 +249,7 @@ impl ResultTarget {
         Ok(written.with(self.write_times(sampled)?))
     }
 
-    /// Writes the times of a motion file, where they go to a separate file.
+    /// Writes the times of a motion file, if they are written to a separate file.
     fn write_times(&self, sampled: &[SampledClip<'_>]) -> Result<Option<WrittenFile>, Failure> {
         let (Some(destination), [sampled]) = (&self.times, sampled) else {
             return Ok(None);
@@ -341,8 +341,8 @@ impl From<Error> for ResultError {
     }
 }
 
-/// A writer of one format. Nothing is written before the first chunk, so that a failed evaluation leaves
-/// nothing behind, even in a pipe.
+/// A writer of one format. Nothing is written before the first chunk, so that a failed evaluation writes nothing, even
+/// into a pipe.
 struct LateWriter<'a> {
     results: &'static WriteResults,
     result: ResultShape<'a>,
@@ -656,11 +656,11 @@ pub(crate) fn opened(path: &Path) -> Result<Folder, Failure> {
     })
 }
 
-/// A progress bar, and by how much bytes advance it.
+/// A progress bar, and a function that converts bytes to its progress.
 pub(crate) type MeasuredProgress = (Progress, fn(&[u8]) -> u64);
 
-/// The stream into an output: it stops after a signal, moves the progress bar, hashes what passes where that
-/// is asked for, and remembers whether the reader went away.
+/// The stream into an output. It stops after a signal, moves the progress bar, hashes the bytes if this is requested,
+/// and records whether the reader has closed its end.
 pub(crate) struct OutputStream {
     output: Output,
     progress: Option<MeasuredProgress>,

@@ -64,11 +64,11 @@ struct CheckReport<'a> {
     /// Lines of the manifest that cannot be read.
     damaged_lines: usize,
     failed: Vec<&'a InputEntry>,
-    /// Inputs that the batch has not come to.
+    /// Inputs that the batch has not processed.
     pending: BTreeSet<&'a str>,
     /// Inputs and files of options that are not found, so that it is not known whether they have changed.
     not_found: BTreeSet<&'a str>,
-    /// Where the shards of a directory are not merged: how many are done.
+    /// If the shards of a directory are not merged: the number of shards that are done.
     #[serde(skip_serializing_if = "Option::is_none")]
     shards: Option<String>,
 }
@@ -85,11 +85,11 @@ struct FaultyResult<'a> {
 enum Fault {
     Damaged,
     Unreadable(io::Error),
-    /// It was written as a file, and is a link to something else.
+    /// The result was written as a file, but is now a link to something else.
     Link,
     /// This file has other bytes than those that it was made from.
     Stale(String),
-    /// The results of all clips that this input has now are there, and this one is of another clip.
+    /// The result is of a clip that this input does not have any more; the results of all clips that it has exist.
     RemovedClip(String),
 }
 
@@ -265,7 +265,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
 }
 
-/// Facts in a line; `None` where there are none.
+/// Facts in a line; `None` if there are none.
 fn joined(facts: impl IntoIterator<Item = Option<String>>) -> Option<String> {
     let facts: Vec<String> = facts.into_iter().flatten().collect();
     (!facts.is_empty()).then(|| facts.join(", "))
@@ -300,8 +300,8 @@ impl Remedies {
         }
     }
 
-    /// `tumble features … --resume makes them again`; `None` where that would not help. The verb is that of one command,
-    /// and of several.
+    /// `tumble features … --resume makes them again`; `None` if that would not help. `verbs` are the verb for one
+    /// command, and the verb for several.
     fn resume(&self, more: &str, verbs: [&str; 2], again: &str) -> Option<String> {
         let helps = self.is_known && !self.has_damaged_lines;
         let lines = self.lines(&format!("--resume{more}"));
@@ -366,7 +366,7 @@ fn fault(folder: &Path, entry: &ManifestEntry, inputs: &InputHashes<'_>) -> Opti
     }
 }
 
-/// The hashes of inputs as they are now, by their paths in the manifest. Those that are not found have none.
+/// The current hashes of inputs, by their paths in the manifest. Inputs that are not found have no hash.
 #[derive(Default)]
 struct InputHashes<'a> {
     inputs: BTreeMap<&'a str, Option<String>>,
@@ -440,7 +440,7 @@ impl<'a> InputHashes<'a> {
         }
         let made = counts.into_iter().filter(|((_, all), found)| found >= all);
         let files = entries.iter().flat_map(|entry| &entry.option_files);
-        // Those without a hash could be read only once, as standard input.
+        // Files without a hash are left out: they could be read only once, as standard input.
         let files = files.filter(|file| !file.sha256.is_empty());
         let paths: BTreeSet<&str> = files.map(|file| &*file.path).collect();
         let hash = |path| Some(options::content(path)).filter(|_| Path::new(path).exists());

@@ -231,7 +231,8 @@ impl Arguments {
             box_length: loaded.box_length,
             ..target.motion_options()
         };
-        // A channel of one side may be none of the other, so all channels of joints in a glTF file are replaced.
+        // A joint may have a channel that its partner on the other side does not have. Therefore all channels of joints
+        // in a glTF file are replaced.
         let replaces = self.mirror.is_some() && target.format().supports(Feature::SeveralClips);
         let written = match document {
             Some(document) if is_copy => {
@@ -305,7 +306,7 @@ impl Arguments {
         Ok(work.result(written, &done, None))
     }
 
-    /// The reason for a new file, where the input is not rewritten.
+    /// The reason why a new file is made; `None` if the input's file is written again.
     fn makes_new(&self, target: &ResultTarget) -> Option<&'static str> {
         let several = target.format().supports(Feature::SeveralClips);
         let chooses = self.inputs.reading.chooses_animation() && several;
@@ -313,7 +314,7 @@ impl Arguments {
     }
 }
 
-/// Says that the weights of morph targets stay as they are, if some are those of one side.
+/// Prints that the weights of morph targets are not mirrored, if some belong to one side.
 fn note_weights(name: &str, clips: &[&Motion]) {
     for clip in clips {
         let weights = (0..clip.set.scalar_count()).filter_map(|index| clip.set.scalar(index));
@@ -335,8 +336,8 @@ fn note_weights(name: &str, clips: &[&Motion]) {
     }
 }
 
-/// `; 6 pairs of joints change their sides and no joint is mirrored in place`: of each animation by its name, where they
-/// differ.
+/// `; 6 pairs of joints change their sides and no joint is mirrored in place`. If this differs between animations,
+/// there is a text for each, with its name.
 fn mirrored_text(parts: &[Cow<'_, Motion>], changed: &[Option<String>]) -> String {
     let differ = changed.windows(2).any(|pair| pair[0] != pair[1]);
     let texts = changed.iter().flatten().zip(parts);

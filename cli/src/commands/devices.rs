@@ -39,7 +39,7 @@ struct DeviceEntry {
     index: usize,
     #[serde(flatten)]
     info: DeviceInfo,
-    /// It opens, and no self-test and no kernel that it uses and that was checked differs.
+    /// Whether the device opens, and every self-test and every checked kernel that it uses gives the CPU's bits.
     exact: bool,
     self_tests: Vec<SelfTestReport>,
     kernels: KernelSummary,

@@ -26,7 +26,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         }
         Some(name) => {
             let code = Code::named(name).ok_or_else(|| {
-                // Codes have four characters: from a shorter text, none can be told apart as near.
+                // All codes have four characters. A shorter text is similar to too many of them, so none is suggested.
                 let known = Code::ALL.iter().map(|code| code.name());
                 let known = known.filter(|known| known.len() == name.len());
                 let hint = words::nearest(name, known)

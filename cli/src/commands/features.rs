@@ -157,8 +157,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     pipeline.finish()
 }
 
-/// Warns where HumanML3D's numbers would mean another thing than those of its models, because they are steps from frame to
-/// frame.
+/// Warns if the rate differs from that of HumanML3D's models: its numbers are steps from frame to frame, so they would
+/// have another meaning.
 fn warn_of_other_rate(name: &str, rate: FrameRate) {
     /// Frames a second of HumanML3D.
     const RATE: u64 = 20;
@@ -232,7 +232,7 @@ fn check_rest(name: &str, clip: &Motion, roles: &Roles) -> Result<(), Failure> {
 /// How far the limbs of a T-pose are from the axes at most, in degrees; legs are often apart.
 const T_POSE: f64 = 30.0;
 
-/// Whether a set of features depends on what points up.
+/// Whether a set of features depends on the upward axis.
 fn depends_on_ground(set: FeatureSet) -> bool {
     matches!(
         set,

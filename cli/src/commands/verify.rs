@@ -68,13 +68,13 @@ struct VerificationLine {
     input: String,
     #[serde(flatten)]
     found: Verification,
-    /// The names of their tracks, where they have one.
+    /// The names of the tracks of the worst sample and of the first difference, if they have names.
     worst_track_name: Option<String>,
     first_difference_track_name: Option<String>,
-    /// A Vulkan device gives the CPU's bits, near the reference.
+    /// Whether a Vulkan device gives the CPU's bits and these are near the reference.
     pass: bool,
     verdict: Verdict,
-    /// About the input, with its first method, and about the method.
+    /// Warnings about the method. The line of the first method also has those about the input.
     warnings: Vec<RecordedWarning>,
 }
 

@@ -29,9 +29,9 @@ pub(crate) struct Failure {
     message: String,
     /// Lines below it.
     more: Vec<String>,
-    /// The message is printed as it is, without `error:` before it.
+    /// Whether the message is printed unchanged, without `error:` before it.
     plain: bool,
-    /// An output that cannot be written, where another one may be.
+    /// Whether one output cannot be written, but others may be.
     is_of_one: bool,
     /// The code of the first error of an input.
     input_code: Option<Code>,
@@ -148,7 +148,8 @@ impl Failure {
         Self::new(code, format!("{input}: {error}"))
     }
 
-    /// A result of an input does not fit into the memory that was free, if that is known. Another input's may.
+    /// A result of an input does not fit into memory; results of other inputs may fit. `free` is the memory that was
+    /// free.
     pub(crate) fn memory(input: &str, result: &str, bytes: f64, free: Option<u64>) -> Self {
         let limit = free.map_or_else(
             || "less memory is free".to_owned(),
@@ -160,7 +161,7 @@ impl Failure {
         }
     }
 
-    /// A result of an input does not fit on the disk. Another input's may. `limit` says how much is free.
+    /// A result of an input does not fit on the disk; results of other inputs may fit. `limit` says how much is free.
     pub(crate) fn room(input: &str, result: &str, bytes: f64, limit: &str) -> Self {
         let amount = words::bytes(bytes);
         let message = format!(
@@ -195,12 +196,13 @@ impl Failure {
         &self.message
     }
 
-    /// The same with the messages of the errors, for the manifest and for JSON: they were printed.
+    /// The same failure with the messages of the errors, which were printed already. The manifest and JSON contain
+    /// them.
     pub(crate) fn with_causes(self, causes: Vec<String>) -> Self {
         Self { causes, ..self }
     }
 
-    /// The messages of the errors in an input, where its own message is a summary of them.
+    /// The messages of the errors in an input, if the failure's message is a summary of them.
     pub(crate) fn causes(&self) -> &[String] {
         &self.causes
     }
@@ -224,7 +226,7 @@ impl Failure {
     }
 }
 
-/// Whether the error concerns this file alone: its name, its folder or its length.
+/// Whether the error concerns only this file: its name, its folder or its length.
 fn is_of_one(error: &io::Error) -> bool {
     use io::ErrorKind::{
         AlreadyExists, DirectoryNotEmpty, FileTooLarge, InvalidFilename, InvalidInput,
@@ -321,7 +323,7 @@ pub(crate) struct FailedInputs {
 }
 
 impl FailedInputs {
-    /// Counts inputs by the exit codes of commands that have each of them alone.
+    /// Counts inputs by the exit code of a command that has only this input.
     pub(crate) fn of_codes(codes: impl Iterator<Item = Option<u8>>) -> Self {
         codes.fold(Self::default(), |mut count, code| {
             match code {

@@ -44,7 +44,7 @@ pub(crate) fn json(value: &impl serde::Serialize) -> Result<(), Failure> {
     })
 }
 
-/// As [`json`], exactly this value: a list that has no warnings, or a document that a file has too.
+/// As [`json`], but exactly this value, without warnings: a list, or a document that is also written to a file.
 pub(crate) fn document(value: &impl serde::Serialize) -> Result<(), Failure> {
     HAS_JSON.store(true, Ordering::Relaxed);
     let text =

@@ -46,8 +46,9 @@ pub(crate) fn stem(path: &Path) -> String {
     }
 }
 
-/// The names of the pictures of some inputs, no two of them the same: their stems; where several inputs share one, with
-/// as many directories before it as tell them apart (`sh010-walk`), and with the ending if these do not.
+/// Names for the pictures of some inputs, no two of them the same. A name is the stem of the input's file. If several
+/// inputs share a stem, as many directories as are needed to distinguish them stand before it (`sh010-walk`). If these
+/// do not suffice, the name has the file's ending, too.
 pub(crate) fn distinct_stems(paths: &[PathBuf]) -> Vec<String> {
     let mut names: Vec<String> = paths.iter().map(|path| stem(path)).collect();
     for depth in 1.. {

@@ -26,7 +26,7 @@ pub(crate) enum ProgressStyleChoice {
     Never,
 }
 
-/// How this process shows progress; the bar that is on the terminal.
+/// How this process shows progress, and the bar that is on the terminal.
 struct Shown {
     style: ProgressStyleChoice,
     bar: Option<ProgressBar>,
@@ -63,7 +63,7 @@ pub(crate) struct Progress {
     failed: u64,
     bytes: u64,
     started: Instant,
-    /// When a line of JSON was written last.
+    /// The time when the last line of JSON was written.
     last_line: Instant,
     bar: Option<ProgressBar>,
 }

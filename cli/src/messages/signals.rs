@@ -1,11 +1,12 @@
 //! Ctrl-C, SIGTERM, SIGHUP and SIGQUIT, on Windows Ctrl-C, Ctrl-Break and a closed window: stop soon, and
 //! leave no half-written file.
 //!
-//! A thread waits for the signal, and says that it came. While no output file is open and no batch runs, it ends the
-//! program at once. Otherwise it leaves a mark: the writer of a file finds it at its next chunk, and removes its
-//! temporary file on the way out; a batch finds it before its next input, and says how far it is. A batch that does not
-//! find it for [`GRACE`] is ended without that, unless a file is open. A second signal removes the file itself, and
-//! ends the program at once. Signals that this process was started to ignore, as by `nohup`, are ignored.
+//! A thread waits for the signal, and prints a line about it. While no output file is open and no batch runs, it ends
+//! the program at once. Otherwise it sets a mark. The writer of a file checks the mark before its next chunk, and
+//! removes its temporary file; a batch checks it before its next input, and prints how far it has come. If a batch does
+//! not check the mark within [`GRACE`], it is ended without this line, unless a file is open. A second signal removes
+//! the file itself, and ends the program at once. Signals that this process was started to ignore, as by `nohup`, are
+//! ignored.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
@@ -24,7 +25,8 @@ struct SignalState {
     signal: Option<i32>,
 }
 
-/// How long a batch may take to find that a signal came.
+/// The time that a batch has to react to a signal. After it, the signal ends the program, unless an output file is
+/// open.
 const GRACE: Duration = Duration::from_secs(2);
 
 static STATE: Mutex<SignalState> = Mutex::new(SignalState {
@@ -41,7 +43,7 @@ fn code(signal: i32) -> u8 {
     128 + signal as u8
 }
 
-/// Ends the program, or leaves a mark for the writer of a file and for the batch.
+/// Ends the program. If a file is being written or a batch runs, records the signal instead, and they stop.
 fn handle_signal(signal: i32) {
     // Print without holding the lock: printing may have to wait for a reader, and the main thread needs the lock.
     if stopped().is_none() {

@@ -1,8 +1,7 @@
 //! Words for people, on standard error.
 //!
-//! `anstream` drops the colours when the stream is no terminal or `NO_COLOR` is
-//! set. A standard error that is closed must not end the program, so what it
-//! refuses is lost.
+//! `anstream` drops the colours when the stream is no terminal or `NO_COLOR` is set. A closed standard error must not
+//! end the program, so lines that cannot be written are dropped.
 
 use std::any::Any;
 use std::ffi::OsString;

@@ -20,12 +20,12 @@ const CONTINUATION: [u8; 4] = [0xff; 4];
 /// Length of the prefix of a compressed buffer, which is its uncompressed length.
 const PREFIX: usize = 8;
 
-/// The largest number of bytes that each byte of a compressed file may unpack to, on average. Equal numbers compress
-/// to nearly nothing, but the times beside them differ.
+/// The largest number of bytes that each byte of a compressed file may unpack to, on average. Equal numbers may
+/// compress further, but the times in the same file differ.
 const MAX_EXPANSION: u64 = 1024;
 
-/// Bytes of memory for each row of a column and for each unpacked byte: while it is decoded, in the table's columns
-/// and in the keys.
+/// Bytes of memory for each row of a column and for each unpacked byte. The memory is that of decoding, of the table's
+/// columns and of the keys.
 const DECODED: usize = 8;
 
 /// Whether the first bytes are those of a stream: a message of a plausible length.

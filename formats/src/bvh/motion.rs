@@ -87,7 +87,8 @@ impl FrameKeys {
 
     fn push(&mut self, hierarchy: &Hierarchy, row: &[f64]) {
         if self.count == 0 {
-            // Positions that need an origin have at least half of the large magnitude in every frame.
+            // If a position is so large that it needs an origin, it has at least half of the limit in every frame. So
+            // the first frame decides.
             let is_large = |channel: &&(usize, usize)| row[channel.1].abs() >= 0.5 * SMALL;
             let mut all = hierarchy.joints.iter().flat_map(|joint| &joint.positions);
             let width = self.positions.width();
@@ -202,8 +203,8 @@ impl FrameKeys {
     }
 }
 
-/// Programs that know the rotations of joints and not their positions, as of a body whose shape is not known, write
-/// such files.
+/// Such files are written by programs that know the rotations of joints but not their positions, for example of a body
+/// whose shape is unknown.
 const NO_OFFSETS: &str = "all offsets in the file are 0, so the positions of joints relative to their parents are \
                           unknown; give them with --offsets";
 
@@ -365,7 +366,7 @@ fn read_row<R: BufRead>(
     for (column, token) in tokens(line) {
         let number = match number::parse(token) {
             Ok(number) if row.len() < columns => number,
-            // The joint will be left out.
+            // The number belongs to a joint that will be left out, so it need not be finite.
             Err((Code::NotFinite, _)) if needed.get(row.len()) == Some(&false) => {
                 row.push(0.0);
                 continue;

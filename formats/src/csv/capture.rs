@@ -9,11 +9,11 @@ use tumble::FrameRate;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::format::Space;
 
-/// The heading of such a table.
+/// The heading of a table of a motion-capture program.
 pub(super) struct CaptureHeading {
     /// The name of each column.
     pub(super) names: Vec<String>,
-    /// The rate of frames that are counted; `None` where each row has its time.
+    /// The rate of frames that are counted; `None` if each row has its time.
     pub(super) rate: Option<FrameRate>,
     /// The unit that the file states, and the up axis that its program has by default.
     pub(super) space: Space,
@@ -42,7 +42,7 @@ pub(super) fn has_no_number(record: &ByteRecord) -> bool {
     !record.iter().map(<[u8]>::trim_ascii).any(is_number)
 }
 
-/// The cell of a row; empty behind its end.
+/// The cell of a row; empty after its end.
 fn at(row: &[String], column: usize) -> &str {
     row.get(column).map_or("", String::as_str)
 }

@@ -193,7 +193,7 @@ impl<'a, W: Write> CsvWriter<'a, W> {
             if self.is_w_first() {
                 numbers.rotate_right(1);
             }
-            // Quaternions are never rounded.
+            // Quaternions are written without rounding; other encodings are rounded to f32.
             if !self.encoding.is_quaternion() {
                 let encoded = self.encoding.encode(&[q.to_array()], &mut bytes);
                 encoded.map_err(std::io::Error::other)?;

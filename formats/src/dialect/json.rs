@@ -64,13 +64,14 @@ const KNOWN: [&str; 5] = [
 /// The numbers of a frame of AMP before those of joints: the root's position and rotation.
 const ROOT: usize = 7;
 
-/// The numbers of a frame of the robot A1: after its 12 joints, where its toes are, and velocities.
+/// For the robot A1: the numbers of a frame (in addition to 12 joints it has positions of toes and velocities), and the
+/// number of joints.
 const A1: [usize; 2] = [61, 12];
 
 /// The parts of a robot in an episode.
 const PARTS: [&str; 5] = ["left_arm", "right_arm", "left_ee", "right_ee", "body"];
 
-/// The names of joints of the left and of the right arm begin so.
+/// How the names of the joints of the left and of the right arm begin.
 const SIDES: [&str; 2] = ["kLeft", "kRight"];
 
 fn open_json(path: &Path, options: &ReadOptions) -> Result<Loaded, Diagnostic> {

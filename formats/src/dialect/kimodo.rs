@@ -35,7 +35,7 @@ pub(super) static DIALECT: Dialect = Dialect {
         let mut plan = ArchivePlan {
             is_world: true,
             is_part: true,
-            // These arrays follow from the poses of all joints.
+            // No warning names these arrays, because their contents follow from the poses of all joints.
             companions: &[
                 "local_rot_mats",
                 "root_positions",

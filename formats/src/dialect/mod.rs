@@ -38,7 +38,7 @@ pub struct Dialect {
     pub summary: &'static str,
     /// The arrays that a file has.
     arrays: &'static [(&'static str, &'static [Axis])],
-    /// The first track is `body` of these arrays, whose joints are the columns of another.
+    /// Makes the plan of such a file.
     plan: fn(&Archive, &mut Warnings) -> Result<ArchivePlan, Diagnostic>,
 }
 
@@ -215,7 +215,8 @@ fn root(
     Ok((part, frames))
 }
 
-/// The arrays with the names of joints and bodies: those that `tumble eval --describe` adds, and that others call so.
+/// The arrays with the names of joints and bodies. `tumble eval --describe` adds them with these names, which other
+/// programs use, too.
 const JOINT_NAMES: &str = "joint_names";
 const DOF_NAMES: &str = "dof_names";
 const BODY_NAMES: &str = "body_names";

@@ -31,7 +31,7 @@ pub(super) const JOINT: &str = "_dof";
 /// The fewest columns of Unitree's files: position, quaternion, two joints.
 const FEWEST: usize = 9;
 
-/// After so many lines of a dialect, another line is a damaged one of it.
+/// After this many lines of a dialect, a line of another form counts as damaged, not as another dialect.
 const CERTAIN: usize = 2;
 
 /// How far from 1 the norm of a quaternion may be.
@@ -91,7 +91,7 @@ pub(crate) fn read(
         let cells = text.split(',').map(|cell| cell.trim().parse());
         let row: Option<Vec<f64>> = cells.map(Result::ok).collect();
         let Some(row) = row.filter(|row| row.len() == width) else {
-            // Rows that are surely of the dialect stand before a damaged one.
+            // A damaged row is reported only if enough rows before it certainly belong to the dialect.
             if before < CERTAIN * width || !is_known(&numbers) {
                 return Ok(None);
             }

@@ -36,8 +36,8 @@ pub struct WrittenDialect {
     pub names_joints: bool,
     /// Whether its numbers for joints are degrees. Slides have none.
     pub has_degrees: bool,
-    /// Whether its simulator merges the links of URDF that are fixed into those that they are fixed to. Bodies of MJCF
-    /// stay as they are.
+    /// Whether its simulator merges fixed links of URDF into the links to which they are fixed. Bodies of MJCF are not
+    /// merged.
     pub merges_links: bool,
     /// The point of a body whose velocity it has.
     pub velocity_at: VelocityPoint,
@@ -45,7 +45,7 @@ pub struct WrittenDialect {
     pub quaternions: Option<ComponentOrder>,
     /// The rate that its readers assume, in frames a second, if it has none.
     pub assumed_rate: Option<u64>,
-    /// Whether its readers take a rate in whole frames a second alone.
+    /// Whether its readers only accept rates of whole frames per second.
     pub has_whole_rate: bool,
     /// What another ending than [`WrittenDialect::extension`] means to its readers, if they decide by it.
     pub other_endings: Option<&'static str>,
@@ -95,7 +95,7 @@ pub fn written_joints(tree: &Tree, bodies: &[usize]) -> Vec<usize> {
     joints_of(tree, bodies)
 }
 
-/// For motions that no dialect can hold.
+/// The remedy in messages about motions that no dialect can hold.
 const OTHER_FILES: &str =
     "leave out --dialect (in Python `dialect`) and write NPZ, CSV or Parquet, which can store it";
 

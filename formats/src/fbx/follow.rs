@@ -14,11 +14,11 @@ use crate::rate::frame_time;
 /// the largest number of the channel.
 pub(super) const BOUND: f64 = 1e-6;
 
-/// The parameters in an interval at which both are compared. They are not simple fractions, at which whole rotations
-/// could be overlooked.
+/// The parameters in an interval at which the curve and the keys are compared. They are not simple fractions, because
+/// at those a whole turn within the interval could be overlooked.
 const COMPARED: [f64; 3] = [0.839, 0.487, 0.171];
 
-/// The parameter at which a rotation is checked that is the same at the ends and the thirds of an interval.
+/// If a rotation is the same at the ends and the thirds of an interval, it is also checked at this parameter.
 const BETWEEN: f64 = 0.414_213_56;
 
 /// How often an interval is divided in two.

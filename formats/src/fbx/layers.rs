@@ -1,6 +1,6 @@
-//! The animation that `ufbx` evaluates for a stack, corrected where Autodesk's SDK differs from `ufbx`: muted layers
-//! have no effect, a layer that overrides others scales its translations by its weight, and nodes with the spheric
-//! rotation order rotate as those of the order XYZ.
+//! The animation that `ufbx` evaluates for a stack, corrected where Autodesk's SDK differs from `ufbx`. Muted layers
+//! have no effect. A layer that overrides others scales its translations by its weight. Nodes with the spheric rotation
+//! order rotate as those of the order XYZ.
 
 use std::collections::HashMap;
 
@@ -119,8 +119,7 @@ pub(super) fn without_spheric_orders(
 }
 
 impl StackLayers {
-    /// # Errors
-    /// When the library has no memory, or when the budget has none.
+    /// # Errors When the library cannot allocate memory, or when the budget is exhausted.
     pub(super) fn of(
         scene: &Scene,
         stack: &AnimStack,

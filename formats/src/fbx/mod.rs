@@ -84,9 +84,9 @@ const DEPTH: u32 = 1024;
 /// The distance in seconds on either side of a key at which a curve is evaluated, to find jumps.
 const BESIDE: f64 = 1e-10;
 
-/// How often curves are evaluated: the number for every input, and the number for each byte of it. Each layer that moves
-/// a node counts, because each is evaluated. A key of a node whose ten layers have keys there takes 600 evaluations, and
-/// the layers have a byte and more for each of up to ninety curves.
+/// The maximum number of evaluations of curves: a number for every input, and a number for each of its bytes. The
+/// evaluation of a node counts once for each layer that moves it. The numbers suffice for a key of a node that ten
+/// layers move: it takes 600 evaluations, and in the file it takes at least a byte for each of up to ninety curves.
 const EVALUATIONS: (i64, i64) = (1 << 22, 64);
 
 /// Bytes of memory of a track without its keys, of a key time while it is evaluated, and of a key.
@@ -348,7 +348,7 @@ struct FbxReader<'a> {
     nodes: FbxNodes,
     /// The rate that the file states.
     rate: Option<FrameRate>,
-    /// The animation without layers, in which nodes rest; `None` if `ufbx` knows where they rest.
+    /// The animation without layers, in which nodes are in their rest poses; `None` if `ufbx` provides the rest poses.
     rests: Option<AnimRoot>,
     options: &'a ReadOptions,
     /// How many evaluations are left.
@@ -481,7 +481,7 @@ impl FbxReader<'_> {
                 return Err(too_large(reason));
             }
         }
-        // Keys that follow a curve may lie on other frames.
+        // Keys that were added to follow a curve may be at frames of another rate, which is not the clip's.
         let is_of_file = |rate: &FrameRate| [self.rate, takes.rate].contains(&Some(*rate));
         clip.rate = clip.rate_of_keys().filter(is_of_file);
         Ok(clip)
@@ -489,7 +489,7 @@ impl FbxReader<'_> {
 
     /// Finds the rate of the keys, and moves the ends of the clip to frames of it if they were rounded to f32.
     fn on_frames(&self, mut takes: Takes) -> Takes {
-        // Ticks are 2.2e-11 s.
+        // FBX counts time in units of 2.2e-11 s.
         const TICKS: Precision = Precision::Decimals(10);
         let found = of(&RateSource::Times(&takes.keys, TICKS));
         takes.rate = found.and_then(FrameGrid::rate);

@@ -273,7 +273,7 @@ pub(super) fn inherits_scale(node: &Node) -> bool {
 }
 
 /// The first and the last time of a stack, or of its keys if the stack does not contain them. Programs write ends that
-/// were rounded to f32, 2e-8 s after the last key; such an end is that key.
+/// were rounded to f32, for example 2e-8 s after the last key; such an end counts as the time of the key.
 fn span<'a>(stack: &AnimStack, layers: impl Iterator<Item = &'a AnimLayer>) -> [f64; 2] {
     let curves = layers.flat_map(|layer| layer.anim_values.iter());
     let curves = curves.flat_map(|value| value.curves.iter().flatten());
@@ -304,7 +304,8 @@ pub(super) fn was_rounded(time: f64, exact: f64) -> bool {
 }
 
 impl ChannelTimes {
-    /// Adds the times of a curve, repeated as often as it is within a span. Returns how many of its keys lie outside.
+    /// Adds the times of a curve and of its repetitions within a span. Returns how many of its keys are outside the
+    /// span.
     fn add(
         &mut self,
         curve: &AnimCurve,

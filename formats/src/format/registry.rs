@@ -9,13 +9,13 @@ use crate::pickle;
 use crate::source::{START, Source};
 
 impl Format {
-    /// How the names of its files end by default: the first of its extensions that readers look for, or its name.
+    /// The default extension of its files: the one that programs look for, or else the format's name.
     #[must_use]
     pub fn ending(&self) -> &'static str {
         match self.name {
             // Loaders of robots' motions look for `*.pkl`.
             "pickle" => "pkl",
-            // Those of ProtoMotions look for `*.motion`.
+            // The loader of ProtoMotions looks for `*.motion`.
             "torch" => "motion",
             name => name,
         }

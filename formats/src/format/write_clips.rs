@@ -173,7 +173,7 @@ fn no_room(
     // If the format has no start, another warning reports that the times are shifted.
     let has_start = format.supports(Feature::Start);
     let missing = missing.filter(|feature| has_start || *feature != Feature::Nanoseconds);
-    // Limits are those of scalars.
+    // Limits belong to scalars. If the format cannot store scalars, limits are not named in addition.
     let has_scalars = format.supports(Feature::Scalars);
     let missing = missing.filter(|feature| has_scalars || *feature != Feature::Limits);
     let left_out: Vec<&str> = missing

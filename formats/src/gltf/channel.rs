@@ -17,7 +17,7 @@ pub(super) struct MovedChannel {
     pub(super) channel: usize,
     pub(super) node: usize,
     pub(super) path: TargetPath,
-    /// The number of elements of its values for each key: that of the morph targets for weights, 1 for others.
+    /// The number of elements of its values for each key: for weights the number of morph targets, otherwise 1.
     pub(super) elements: usize,
     /// Its sampler's index among the animation's samplers.
     pub(super) sampler_index: usize,
@@ -126,7 +126,7 @@ impl MovedChannel {
             _ => 1,
         };
         match self.path {
-            // Each target is a scalar with times.
+            // Each morph target becomes a scalar, which has its own list of times.
             TargetPath::Weights => self.elements * (size_of::<f64>() + values * size_of::<f32>()),
             _ => size_of::<f64>() + values * size_of::<Quat>(),
         }
@@ -270,8 +270,8 @@ impl MovedChannel {
 /// Two rotations whose dot product is within this of 0 differ by 180°, up to the rounding of f32.
 const HALF_TURN_PRODUCT: f64 = 1.0 / (1u64 << 21) as f64;
 
-/// Between neighbouring keys that differ by 180°, sets keep the signs of the keys. This makes their inner product
-/// positive or 0, by which glTF defines the shorter arc.
+/// Between neighbouring keys that differ by 180°, sets keep the signs of the keys. This makes the inner product of the
+/// two keys positive or 0, because glTF defines the shorter arc by the sign of this product.
 fn half_turns(keys: &mut [Quat], warnings: &mut Warnings, location: &dyn Fn(usize) -> Location) {
     for key in 1..keys.len() {
         let product = dot(keys[key - 1].as_dquat(), keys[key].as_dquat());

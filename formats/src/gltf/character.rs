@@ -164,7 +164,7 @@ pub(super) fn replace_joints(
         if animation.channels.is_empty() {
             writer.add(&mut animation, (index, joints), AtRest::Written, edits)?;
         }
-        // Samplers without keys.
+        // The clip has no keys at all, so there is no animation.
         if animation.channels.is_empty() && moves_joints {
             continue;
         }

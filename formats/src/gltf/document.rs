@@ -179,7 +179,7 @@ impl Document for GltfDocument {
     }
 }
 
-/// The parts that are written other than they were read.
+/// The parts that are written with other contents than were read.
 enum Change<'a> {
     /// The keys of some animations.
     Keys(&'a [(usize, SampledClip<'a>)]),

@@ -138,7 +138,7 @@ impl<'a> Edits<'a> {
     /// The text with all changes.
     pub(super) fn finish(mut self) -> String {
         let text = self.json.text;
-        // The object at the top has members: `asset` was read.
+        // The comma is right, because the top object has at least one member, `asset`, which was read.
         let end = text.trim_end().len() - 1;
         for (list, entries) in self.missing {
             let member = format!(",\"{list}\":[{}]", entries.join(","));

@@ -250,8 +250,8 @@ fn encode_list(mut list: Vec<u8>, stream: &mut Vec<u8>) {
     }
 }
 
-/// The smallest number of bytes between the header and the tail of a stream: two bits for each group in version 0,
-/// two bits for each block in version 1, each for every byte of an element.
+/// The smallest number of bytes between the header and the tail of a stream. For every byte of an element, version 0
+/// has at least two bits for each group, and version 1 has at least two bits for each block.
 fn least_body(count: usize, stride: usize, block: usize, has_channels: bool) -> u128 {
     let stride = stride as u128;
     if has_channels {

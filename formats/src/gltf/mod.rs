@@ -4,12 +4,12 @@
 //! their skins; the weights of morph targets are scalars. The parts of a file that are read are checked. Other parts may contain anything, and are written back
 //! byte for byte when the file is written with other keys.
 //!
-//! Reading: `container` splits a GLB into its chunks, `json` finds values in the text without copying them, `reader`
-//! returns the bytes of views and the numbers of accessors, each loaded and decoded once, `nodes` contains the
-//! hierarchy, `morphs` the morph targets of meshes, `channel` the keys of one channel, and `animation` makes a clip of one animation. Writing the same file
-//! again: `document` keeps it, `bake` replaces the keys of one animation by `edits` of the text and by bytes that
-//! `data` appends, `prune` leaves out the keys that were replaced, and `gather` embeds the files beside a `.gltf` in a GLB. Writing clips of any format to a new
-//! file: `write_new`.
+//! Reading: `container` splits a GLB into its chunks, and `json` finds values in the text without copying them.
+//! `reader` returns the bytes of views and the numbers of accessors, each loaded and decoded once. `nodes` contains the
+//! hierarchy, `morphs` the morph targets of meshes, and `channel` the keys of one channel. `animation` makes a clip of
+//! one animation. Writing the same file again: `document` keeps it. `bake` replaces the keys of one animation by
+//! `edits` of the text and by bytes that `data` appends. `prune` leaves out the keys that were replaced, and `gather`
+//! embeds the files beside a `.gltf` in a GLB. Writing clips of any format to a new file: `write_new`.
 
 mod animation;
 mod bake;

@@ -22,12 +22,12 @@ pub(super) struct Morphs {
 #[derive(Default)]
 struct MeshTargets {
     count: usize,
-    /// Their names in its extras; empty where it has none, or repeats one. There may be fewer than targets.
+    /// Their names in its extras; empty if it has none, or repeats one. There may be fewer than targets.
     names: Vec<String>,
 }
 
 impl Morphs {
-    /// The targets of a file. Meshes that are not as in glTF have none: no animation needs them.
+    /// The targets of a file. Meshes with errors have none, because no animation needs them.
     ///
     /// # Errors
     /// When the names take more memory than the budget allows.
@@ -63,8 +63,8 @@ impl Morphs {
         self.of_node(nodes, node).map_or(0, |mesh| mesh.count)
     }
 
-    /// The name of the scalar of a target: that of the target if no other target has it, else `NODE.NAME`; without a name
-    /// `NODE.weights[3]`.
+    /// The name of the scalar of a target: the target's name if no other target has the same, else `NODE.NAME`; without
+    /// a name `NODE.weights[3]`.
     pub(super) fn name(&self, nodes: &Nodes, node: usize, target: usize) -> String {
         let mesh = self.of_node(nodes, node);
         let name = mesh.and_then(|mesh| mesh.names.get(target));

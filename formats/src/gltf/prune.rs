@@ -56,15 +56,15 @@ struct References<'a> {
 /// A text, and the bytes that are left out of its BIN chunk.
 type PrunedText = (String, Cut);
 
-/// The text of a file with other keys, without what `before`, the file as it was, used for its animations and the new
-/// text does not use, and what to leave out of its BIN chunk of `length` bytes. A file with parts that are not as in
-/// glTF, so that it is not known what they refer to, stays as it is.
+/// Removes the objects that the animations of `before`, the original file, used and that `text`, the file with other
+/// keys, does not use. Returns the new text, and the bytes to leave out of the BIN chunk of `length` bytes. If the file
+/// has parts that glTF does not define, their references are unknown, so nothing is removed.
 pub(super) fn prune(before: &Json<'_>, text: String, length: usize) -> PrunedText {
     let pruned = without_unused(before, &text, length, |json| unused_samplers(before, json));
     pruned.ok().flatten().unwrap_or((text, Cut::default()))
 }
 
-/// See [`prune`]; for a text whose animations are other ones than before.
+/// As [`prune`], for a text in which other animations replace those of the original file.
 pub(super) fn prune_replaced(before: &Json<'_>, text: String, length: usize) -> PrunedText {
     let pruned = without_unused(before, &text, length, |_| Ok(Vec::new()));
     pruned.ok().flatten().unwrap_or((text, Cut::default()))
@@ -660,7 +660,7 @@ impl<'a> Layout<'a> {
     }
 }
 
-/// The bytes of an accessor in its buffer; `None` where they are not known.
+/// The bytes of an accessor in its buffer; `None` if they are not known.
 fn span_of(raw: &RawValue, view: &BufferView<'_>) -> Option<Range<u64>> {
     let accessor: Accessor = serde_json::from_str(raw.get()).ok()?;
     let component = match accessor.component_type {

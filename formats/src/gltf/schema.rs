@@ -210,8 +210,8 @@ impl TargetPath {
         }
     }
 
-    /// How many numbers an element of such an accessor has. A key of weights has an element for each morph target, one of
-    /// the others a single one.
+    /// The number of numbers of an element of the accessor. A key of weights has an element for each morph target; all
+    /// other keys have one element.
     pub(super) fn width(self) -> usize {
         match self {
             Self::Rotation => 4,

@@ -73,7 +73,7 @@ impl CarriedMeshBuilder<'_, '_> {
             Some(skin) => self.add_bones(skin, index)?,
             None => match self.carrier(index)? {
                 Some(bone) => self.mesh.bones.push(bone),
-                // The clip has no keys for it.
+                // The clip has no keys for this target, so there is nothing to store.
                 None => return Ok(()),
             },
         }

@@ -269,7 +269,7 @@ fn write_glb(
 ) -> io::Result<()> {
     json.resize(json.len().next_multiple_of(4), b' ');
     write_words(out, [GLTF, 2, length])?;
-    // Both are parts of `length`.
+    // `length` includes the two chunks that follow.
     write_words(out, [json.len() as u32, JSON])?;
     out.write_all(&json)?;
     write_words(out, [chunk.length as u32, BIN])?;

@@ -146,7 +146,7 @@ impl WrittenKeys {
     }
 }
 
-/// Cubics of glTF have at least two keys; a single key becomes a constant, whatever its interpolation.
+/// Cubics of glTF have at least two keys. A single key therefore becomes a constant, with any interpolation.
 fn lasting(sampler: ChannelInterpolation, times: &[f64]) -> ChannelInterpolation {
     match (sampler, times.len()) {
         (ChannelInterpolation::Cubic, 0 | 1) => ChannelInterpolation::Linear,

@@ -179,7 +179,8 @@ impl StampClock {
     }
 }
 
-/// Gives a static transform times: that of its first value is `start`, and those of other values are when they came.
+/// Sets the times of a static transform: the time of its first value is `start`, and the times of its other values are
+/// their stamps, or else the times at which they were logged.
 fn resolve_static(body: &mut Body<'_>, start: Option<i64>, clock: &StampClock) {
     let mut kept: Vec<TimedPose> = Vec::new();
     let mut last_stamp = i64::MIN;
@@ -206,7 +207,7 @@ fn resolve_static(body: &mut Body<'_>, start: Option<i64>, clock: &StampClock) {
     body.poses = kept;
 }
 
-/// Warns if some bodies have times of the log's clock, and others times of another one.
+/// Warns if some bodies have times of the log's clock, and others have times of another clock.
 fn warn_of_clocks(bodies: &[Body<'_>], warnings: &mut Warnings) {
     let moving = bodies
         .iter()
@@ -380,7 +381,7 @@ fn keys(
         );
         return Err(body.refuse(file, row, Code::TimeNotIncreasing, message));
     }
-    // Messages may overtake each other.
+    // Messages may be in another order in the log than that of their times.
     body.poses.sort_by_key(|pose| pose.time);
     let location = |key: usize| body.location(key);
     let origin = Origin {

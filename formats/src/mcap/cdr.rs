@@ -136,8 +136,8 @@ impl<'a> Cdr<'a> {
 mod tests {
     use super::*;
 
-    /// A header and a pose by the rules of each kind of CDR: numbers of eight bytes lie on multiples of 8
-    /// behind the first four bytes, of version 2 on multiples of 4.
+    /// A header and a pose by the rules of each kind of CDR. Numbers of eight bytes are at multiples of 8 after the
+    /// first four bytes; in version 2, at multiples of 4.
     #[test]
     fn both_versions_and_both_orders_of_bytes_are_read() {
         for (kind, is_little, max_alignment) in

@@ -18,7 +18,8 @@ const MESSAGE: u8 = 5;
 const CHUNK: u8 = 6;
 const DATA_END: u8 = 15;
 
-/// The largest size of all chunks together, in budgets: work, not memory.
+/// The largest size of all unpacked chunks together, as a multiple of the memory budget. It limits the time of reading,
+/// because only one chunk is in memory at a time.
 const UNPACKED: u64 = 16;
 
 /// The channel of a topic: the type and encoding of its messages.
@@ -57,7 +58,7 @@ pub(super) struct Records<'a> {
     borrowed: Option<Borrowed<'a>>,
     /// Bytes of all chunks so far, unpacked.
     unpacked: u64,
-    /// Whether the record was read that ends the data.
+    /// Whether the record that ends the data was read.
     is_complete: bool,
 }
 

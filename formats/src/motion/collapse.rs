@@ -35,11 +35,11 @@ pub enum CollapseError {
 }
 
 impl Motion {
-    /// The clip of these tracks, in this order, and of all scalars. The other joints are left out, but not their motion:
-    /// the child of such a joint becomes a child of its nearest ancestor that is kept, or a root, and its transform becomes
-    /// the product of the transforms in between and of its own. So it has the same pose relative to the kept ancestor at each
-    /// of its keys, which are at the key times of all joints in the product. Between its keys it is interpolated as these
-    /// joints are; joints with different samplers, and cubic splines, become lines.
+    /// The clip of these tracks, in this order, and of all scalars. The other joints are left out, but not their
+    /// motion. A child of such a joint becomes a child of its nearest ancestor that is kept, or a root. Its transform
+    /// becomes the product of its transform and of those in between, with keys at the key times of all these joints. So
+    /// at each key it has the same pose relative to the kept ancestor as before. Between its keys it is interpolated as
+    /// these joints are; if their samplers differ, or are cubic splines, it is interpolated by lines.
     ///
     /// All keys of other joints keep their bits. Translations are unknown in a clip [without
     /// offsets](Motion::lacks_offsets), and only its rotations are multiplied. In a clip that [is in the
@@ -81,7 +81,8 @@ impl Motion {
             product.finish(index, &mut kept);
         }
         if !tracks.iter().any(|&track| parent(track).is_none()) {
-            // The body shape of SMPL determines the position of the root.
+            // The root is left out. The shape of an SMPL body concerns the position of its root, so it does not apply
+            // any more.
             kept.body = None;
         }
         Ok(kept)

@@ -1,9 +1,9 @@
-//! The end of a clip that is sampled at a rate, where it lies between two frames: [`EndFrame`] is the rule,
-//! [`FramesToEnd`] are the samples that follow from it.
+//! The end of a clip that is sampled at a rate, if the end lies between two frames. [`EndFrame`] is the rule for it;
+//! [`FramesToEnd`] are the samples according to the rule.
 //!
 //! A clip of 1.1583 s at 30 fps ends 0.025 s after its frame 34. If nothing followed this frame, the clip would be
-//! shorter, and a loop would jump from one turn to the next. Therefore a file of clips gets one sample more, whose
-//! value is that of the end.
+//! shorter, and a loop would jump at its end. Therefore a file of clips gets one sample more, whose value is that of
+//! the end.
 
 mod result;
 
@@ -74,7 +74,7 @@ impl EndSample {
 const ON_FRAME: f64 = 1e-3;
 
 impl EndFrame {
-    /// [`Key`](Self::Key) where every sample has its time, [`Hold`](Self::Hold) where they are frames of a rate.
+    /// [`Key`](Self::Key) if samples are stored with their times, [`Hold`](Self::Hold) if they are frames of a rate.
     #[must_use]
     pub fn where_times_are(has_times: bool) -> Self {
         match has_times {

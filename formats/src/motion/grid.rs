@@ -39,11 +39,12 @@ pub(crate) fn restore(lists: &mut [Vec<f64>], precision: Precision) -> Option<Fr
     // Exact times may show a rate that rounded ones did not.
     let again = || of(&RateSource::Times(lists, Precision::F64)).and_then(FrameGrid::rate);
     let rate = common.and_then(|common| common.rate().or_else(again));
-    // Sums of a frame time stay where they are.
+    // If each time is a sum of rounded frame times, the times keep their values, and only the rate is returned.
     rate.or_else(|| of_sums(lists).filter(|_| precision == Precision::F32))
 }
 
-/// The fewest keys on successive frames that show that the key at the end alone is between two frames.
+/// At least this many keys on successive frames are needed to conclude that only the key at the end is between two
+/// frames.
 const FRAMES_IN_A_ROW: usize = 8;
 
 /// The frames of clips that end between two of them: a clip of 1.158 s that was evaluated at 60 frames a second has a

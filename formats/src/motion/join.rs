@@ -34,7 +34,7 @@ pub enum JoinError {
     Differ {
         /// The index of the clip.
         clip: usize,
-        /// In what they differ.
+        /// The property in which they differ.
         property: String,
     },
     /// Without time between two clips, the end of one is not the start of the next.
@@ -62,12 +62,12 @@ pub enum JoinError {
     Track(#[from] TrackError),
 }
 
-/// Joins clips of one skeleton in this order. Joints are matched by name and have the order of the first clip. The keys of
-/// the first clip keep their times; the first key of each other clip follows `gap` seconds after the end of the clip
-/// before it; without `gap`, one frame of their common rate. Keys do not change. With a gap of 0, the two clips have
-/// the same pose where they meet, which is kept once. A channel that is constant in one clip, or ends before it, gets
-/// keys where the clip begins and ends, so that it stays constant there. Curves change in the intervals next to the
-/// places where clips meet.
+/// Joins clips of one skeleton in this order. Joints are matched by name and have the order of the first clip. The keys
+/// of the first clip keep their times. The first key of each other clip follows `gap` seconds after the end of the clip
+/// before it, or, without `gap`, one frame of the clips' common rate. The values of keys do not change. With a gap of
+/// 0, the two poses at which clips meet must be equal; they become one key. A channel that is constant in one clip, or
+/// ends before it, gets keys where the clip begins and ends, so that it stays constant there. Curves change in the
+/// intervals next to the places where clips meet.
 ///
 /// # Errors
 /// * When there is no clip.
@@ -113,7 +113,7 @@ pub fn join(clips: &[&Motion], gap: Option<f64>) -> Result<Motion, JoinError> {
         ..first.without_tracks()
     };
     if let Some(robot) = joined.robot.as_mut().filter(|_| clips.len() > 1) {
-        // They are those of the keys of one clip.
+        // The recorded poses of bodies belong to the keys of one clip, so the joined clip has none.
         robot.bodies = None;
     }
     for scalar in 0..first.set.scalar_count() {
@@ -177,7 +177,7 @@ fn check(first: &Motion, clip: &Motion, index: usize) -> Result<(), JoinError> {
     Ok(())
 }
 
-/// A clip, and where it lies in the joined one.
+/// A clip, and its span of time in the joined clip.
 struct ClipPart<'a> {
     clip: &'a Motion,
     /// Its first and its last key in its times.
@@ -233,14 +233,14 @@ type KeySource = (usize, usize);
 struct JoinedKeys<T> {
     times: Vec<f64>,
     keys: Vec<T>,
-    /// The keys before which and after which they stand, which differ where two clips meet; `None` for a key that
-    /// keeps a channel constant.
+    /// For each key, the two keys of clips that it is: seen from the interval before it and from the interval after it.
+    /// They differ where two clips meet. `None` for a key that was added to keep a channel constant.
     sources: Vec<Option<[KeySource; 2]>>,
 }
 
 impl<T: Copy> JoinedKeys<T> {
-    /// The keys of a channel, of which each part has times and keys. `same`: whether two values are equal. On failure,
-    /// the index of the clip at whose end the value is another than at the start of the next.
+    /// Joins the keys of a channel; `lists` has the times and keys of each part. `same` compares two values. The error
+    /// is the index of a clip whose last value differs from the first value of the next clip.
     fn new(
         parts: &[ClipPart<'_>],
         lists: &[(&[f64], &[T])],
@@ -287,8 +287,8 @@ impl<T: Copy> JoinedKeys<T> {
         Ok(found)
     }
 
-    /// The keys of one part, with those that keep it constant from its start to its first key and from its last key to its
-    /// end, where other clips come before and after.
+    /// The keys of one part. If other clips come before or after it, keys are added that keep the channel constant from
+    /// the start of the part to its first key, and from its last key to the end of the part.
     fn held(part: &ClipPart<'_>, (times, keys): (&[f64], &[T]), joins: [bool; 2]) -> Self {
         let mut found = Self {
             times: Vec::new(),
@@ -422,7 +422,7 @@ fn push_track(
             Channel::Scale => "scale",
         };
         let channel = format!("the {word} of `{name}`");
-        // Where a clip has no keys, the joint rests.
+        // In a clip without keys for this joint, the joint is in its rest pose.
         let rests: Vec<(f64, Vec3)> = (parts.iter())
             .map(|part| (part.span.0, part.clip.rest(of, track)))
             .collect();
@@ -458,7 +458,7 @@ fn push_track(
     Ok(channels)
 }
 
-/// The interpolation of a channel, which all clips have in which it moves.
+/// The interpolation of a channel; all clips in which the channel moves have the same one.
 fn sampler<T>(
     parts: &[ClipPart<'_>],
     (track, word): (usize, &str),

@@ -64,8 +64,8 @@ pub enum KeysError {
 /// The keys of a clip as a file of `format` stores them, as samples with a flag. If the flag is `true`, the format
 /// takes the keys of each channel or of each track from the clip, at their separate times
 /// ([`SampledClip::is_at_keys`](crate::motion::SampledClip::is_at_keys)), and the samples are only those at the first
-/// and the last key. This is so in a format with separate key times, if the keys are not samples ([`keyed`]) or if
-/// `is_kept`: the input's file is written again with other keys.
+/// and the last key. The flag is `true` in a format with separate key times if the keys are not samples ([`keyed`]), or
+/// if `is_kept` is set: then the input's file is written again with other keys.
 ///
 /// # Errors
 /// When the keys are not samples, and the format has no separate key times or the poses are relative to the world;
@@ -213,7 +213,7 @@ pub(crate) fn track_times(clip: &Motion, track: usize) -> Option<&[f64]> {
     Some(longest)
 }
 
-/// The key of a sample, or the last one.
+/// The key at the index `sample`, or the last key if there are fewer.
 pub(crate) fn at<T: Copy>(keys: &[T], sample: usize) -> Option<T> {
     keys.get(sample).or(keys.last()).copied()
 }

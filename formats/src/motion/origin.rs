@@ -12,7 +12,7 @@ const SMALL_BESIDE: f64 = 16.0;
 /// Beyond this a coordinate is no position, and f64 holds no whole numbers of its size any more.
 const LARGE: f64 = 9_007_199_254_740_992.0;
 
-/// How many times finer f32 has to be about an origin than about 0.
+/// A coordinate gets an origin only if f32 is this many times finer relative to the origin than relative to 0.
 const GAIN: f64 = 4.0;
 
 /// The box that points fill.
@@ -139,8 +139,8 @@ mod tests {
         assert_eq!(coordinate(2500.5, 0.25), "2500.75");
     }
 
-    /// Positions of maps come back within 1e-9 of themselves, or what f32 and its
-    /// shortest digits round half of their extent by.
+    /// Positions of maps are read back within 1e-9 relative, or within the rounding of half of their extent to f32 and
+    /// its shortest digits.
     #[test]
     fn nothing_of_a_map_is_lost() {
         let mut state = 1u64;

@@ -101,10 +101,10 @@ pub struct KeptSamples {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum OutsideError {
-    /// The samples are none of the clip's.
+    /// The sample times are invalid for the clip.
     #[error(transparent)]
     Samples(#[from] SampleTimesError),
-    /// All lie outside the keys. The numbers are seconds.
+    /// All sample times are outside the keys. The numbers are seconds.
     #[error(
         "none of the requested times, {} to {} s, lies between its keys, {} to {} s",
         asked[0], asked[1], keys[0], keys[1]
@@ -124,7 +124,7 @@ impl Outside {
         [self.before, self.after].map(|it| it == OutsideValue::LeaveOut)
     }
 
-    /// Whether the values of the first and of the last key are held, as where nothing else is asked for.
+    /// Whether the values of the first and of the last key are held, which is the default.
     #[must_use]
     pub fn is_default(self) -> [bool; 2] {
         [self.before, self.after].map(|it| it == OutsideValue::default())
@@ -140,8 +140,8 @@ impl Outside {
         }
     }
 
-    /// The samples without those that are left out, of times that all tracks share. `rate`: that of which they are
-    /// frames, if any.
+    /// The samples without those that are left out, for times that all tracks share. `rate`: the rate of which the
+    /// samples are frames, if any.
     ///
     /// # Errors
     /// When none is left.

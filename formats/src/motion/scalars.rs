@@ -165,8 +165,8 @@ impl Motion {
         ))
     }
 
-    /// The one method for all positions, scales and scalars that change, but for steps; `None` where their samplers differ.
-    /// A robot whose root stands still is interpolated as its joints are.
+    /// The one method for all positions, scales and scalars that change, but for steps; `None` if their samplers
+    /// differ. A robot whose root stands still is interpolated as its joints are.
     #[must_use]
     pub fn numbers_method(&self, methods: &ChannelMethods) -> Option<VectorMethod> {
         if let Some(method) = methods.method.0 {

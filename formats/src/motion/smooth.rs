@@ -30,7 +30,7 @@ pub enum SmoothMotionError {
     Evaluating(#[from] Error),
 }
 
-/// The smoothing of one clip: at which samples, and by which kernel.
+/// The smoothing of one clip: its samples and its kernel.
 #[derive(Debug, Clone)]
 pub struct SmoothJob {
     /// The sample times.
@@ -55,7 +55,7 @@ const EVEN: f64 = 1e-3;
 
 impl SmoothJob {
     /// The smoothing of a clip at the frames of `rate`, or at its keys if there is no rate. `low_pass`, in hertz,
-    /// replaces the kernel of `smoothing`: lower frequencies are kept, whatever the rate of the samples.
+    /// replaces the kernel of `smoothing` by one that keeps lower frequencies, for samples of any rate.
     ///
     /// # Errors
     /// When there is no rate and the keys do not have equal intervals, or when the frequency is too high or too low

@@ -1,6 +1,6 @@
-//! Errors of an estimated path of one body against a reference, as benchmarks of odometry and SLAM define them: after
-//! an alignment, for each pose (absolute) or for steps of some seconds or metres (relative). The results are those of
-//! `evo`.
+//! Errors of an estimated path of one body against a reference, as benchmarks of odometry and SLAM define them. They
+//! are computed after an alignment, for each pose (absolute) or for steps of some seconds or metres (relative). The
+//! results are those of `evo`.
 
 use std::fmt;
 
@@ -289,11 +289,13 @@ fn angle(rotation: DQuat) -> f64 {
 /// Positions whose distances from their mean are a smaller part of its size are all the same.
 const STILL: f64 = 1e-9;
 
-/// The second singular value of the covariance of positions on a line, as a part of the first: of positions that are
-/// a hundred thousandth of the length beside it. f32 rounds positions by a hundredth of this.
+/// If the second singular value of the covariance is at most this part of the first, the positions count as a line.
+/// This corresponds to distances from the line of a hundred thousandth of its length; the rounding of f32 is a
+/// hundredth of this.
 const LINE: f64 = 1e-10;
 
-/// A covariance that is a smaller part of the largest of such paths is 0, but for rounding.
+/// A covariance counts as 0 if it is a smaller part than this of the largest covariance that such paths can have: it is
+/// then due to rounding.
 const UNCORRELATED: f64 = 1e-12;
 
 /// The root of the sum of the squares of a matrix's numbers.

@@ -94,7 +94,7 @@ pub fn trim(clip: &Motion, start: f64, end: f64, engine: &Engine) -> Result<Moti
         }
         let values = [cuts.rotations[index], cuts.rotations[tracks + index]];
         let (times, mut keys) = part.keys(track.times, track.keys, values);
-        // The sign with which the curve continues.
+        // A new key gets the sign with which the curve continues.
         for i in 1..keys.len() {
             if part.is_made(i) && signs_differ(keys[i - 1], keys[i]) {
                 keys[i] = -keys[i];

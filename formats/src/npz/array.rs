@@ -25,9 +25,9 @@ pub(crate) struct Strides {
     pub(crate) component: usize,
 }
 
-/// Makes a key of its numbers. This is a trait and not a closure, because it is called for every key in loops for
-/// each type of number, and only methods can be marked for inlining: a call passes the numbers through memory, which
-/// takes longer than the computation.
+/// Makes a key of its numbers. This is a trait and not a closure, because only methods can be marked for inlining. It
+/// is called for every key, and a call that is not inlined passes the numbers through memory, which takes longer than
+/// the computation.
 pub(crate) trait Make<const N: usize> {
     type Key;
 

@@ -15,7 +15,7 @@ use crate::source::Source;
 /// The arrays of a motion that contain the shape of the body.
 pub(crate) const SHAPE: [&str; 2] = ["betas", "gender"];
 
-/// The shape that a motion's file contains; empty where it is not in numbers or text.
+/// The body shape that a motion file contains; empty if it is stored neither as numbers nor as text.
 pub(crate) fn shape_of(archive: &Archive) -> Result<Shape, Diagnostic> {
     let mut shape = Shape::default();
     if let Some(member) = archive.find("betas") {

@@ -45,7 +45,7 @@ pub(crate) struct ArchivePlan {
     /// The member with the rate.
     pub(crate) rate_member: Option<usize>,
     pub(crate) rate: Option<FrameRate>,
-    /// The error of a rate that is none, unless another replaces it.
+    /// The error if the rate in the file is not a valid rate. It is reported unless another rate replaces this one.
     pub(crate) bad_rate: Option<Diagnostic>,
     /// The message if the file contains two different rates.
     pub(crate) two_rates: Option<String>,
@@ -322,7 +322,7 @@ impl ArchivePlan {
         Ok(())
     }
 
-    /// Takes quaternions of a robot's motion for such in another order.
+    /// Changes the order in which the components of a robot's quaternions are read.
     ///
     /// # Errors
     /// When the file is in no dialect, or has no quaternions.

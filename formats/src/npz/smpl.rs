@@ -147,13 +147,13 @@ pub(crate) fn joints_of_body(joints: usize) -> Option<(Vec<String>, Vec<Option<u
     Skeleton::of(joints).map(|skeleton| (skeleton.names, skeleton.parents))
 }
 
-/// Why the joints of a body have no places.
+/// The reason why the positions of a body's joints are not known.
 pub(crate) const NO_OFFSETS: &str = "the positions of a body's joints depend on its shape; give its model with \
                                      --body-model, or the \
                                      offsets of its joints with --offsets";
 
-/// Whether the archive has the shape of a body and nothing that may be a motion, which has at least two axes. AMASS
-/// stores the shapes of its subjects so.
+/// Whether the archive has the shape of a body and nothing that may be a motion, which has at least two axes. Such
+/// files of AMASS have the shapes of its subjects.
 pub(crate) fn is_body_alone(archive: &Archive) -> bool {
     let is_small = |name: &str| archive.shape(name).is_some_and(|shape| shape.len() < 2);
     let mut members = archive.members.iter().map(|member| &*member.name);

@@ -37,7 +37,7 @@ pub(crate) const SCALAR_NAMES: &str = "scalar_names";
 /// The array with the kind of each scalar: `angle`, `length`, `plain` or `contact`.
 pub(crate) const SCALAR_KINDS: &str = "scalar_kinds";
 
-/// The array with the interpolation of each scalar: `STEP`, `LINEAR`, or empty where it is not stated.
+/// The array with the interpolation of each scalar: `STEP`, `LINEAR`, or empty if it is not stated.
 pub(crate) const SCALAR_SAMPLERS: &str = "scalar_samplers";
 
 /// The array with the limits of each scalar, the smallest and the largest value; NaN for a scalar without.

@@ -74,7 +74,7 @@ impl ParquetFile<'_> {
     /// threads if there are many numbers. `None` if anything is invalid or missing.
     pub(super) fn read_apart(&self, requested: &[TypedColumn<'_>]) -> Option<Table> {
         let schema = self.metadata.parquet_schema();
-        // The first leaf of each column.
+        // For each column, the index of its first leaf.
         let mut leaves = vec![None; schema.root_schema().get_fields().len()];
         for leaf in 0..schema.num_columns() {
             let first_leaf = leaves.get_mut(schema.get_column_root_idx(leaf))?;

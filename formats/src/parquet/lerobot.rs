@@ -16,7 +16,7 @@ pub(crate) const INFO: &str = "../../meta/info.json";
 /// The metadata of a data set.
 #[derive(Deserialize)]
 pub(super) struct Info {
-    /// That the file is of `LeRobot`.
+    /// Shows that the file is one of `LeRobot`, because it is required.
     #[serde(rename = "codebase_version")]
     _version: String,
     features: Map<String, Value>,

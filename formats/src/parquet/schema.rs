@@ -1,5 +1,5 @@
-//! Checks the schema of a file before it is decoded: the crate recurses into its groups, and reserves memory for as many
-//! columns as a group is said to have.
+//! Checks the schema of a file before it is decoded: the crate `parquet` recurses into its groups, and reserves memory
+//! for the number of columns that a group states.
 
 use crate::parquet::thrift::{Compact, INTEGER, LIST, STRUCT};
 
@@ -47,7 +47,7 @@ pub(super) fn check_schema(metadata: &[u8]) -> Result<(), String> {
     Ok(())
 }
 
-/// How many columns follow an entry of a schema in its group; 0 if it is none.
+/// The number of columns that follow an entry of a schema as its group; 0 if the entry is not a group.
 fn columns_of(input: &mut Compact<'_>, kind: u8) -> Option<u64> {
     if kind != STRUCT {
         return None;

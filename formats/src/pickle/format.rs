@@ -109,7 +109,7 @@ fn loaded(contents: Contents, options: &ReadOptions) -> Result<Loaded, Diagnosti
         return Ok(loaded);
     }
     let mut loaded = match npz::of_values(&archive, options) {
-        // Each entry may be a clip.
+        // The arrays are not known, but each entry of the dict may be a clip.
         Err(error) if error.code == Code::UnknownArrays && !dicts.is_empty() => {
             clips_of_dicts(archive, &dicts, options).ok_or(error)?
         }
@@ -119,7 +119,7 @@ fn loaded(contents: Contents, options: &ReadOptions) -> Result<Loaded, Diagnosti
     Ok(loaded)
 }
 
-/// The clips that are the dicts of a dict; `None` if none of them is one.
+/// The clips of a dict whose values are dicts with one clip each; `None` if none of these dicts is a clip.
 fn clips_of_dicts(
     mut archive: Archive,
     dicts: &[(String, usize)],

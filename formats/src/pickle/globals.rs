@@ -250,7 +250,7 @@ impl Class {
 
 impl std::fmt::Display for ClassName {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        // The name of the class says more than those of its modules.
+        // If the name of the module is long, its beginning is left out, because the name of the class tells more.
         let (module, name) = (self.module.as_str(), shown(&self.name));
         match module.char_indices().rev().nth(LONGEST_MODULE) {
             None => write!(f, "{module}.{name}"),

@@ -1,9 +1,9 @@
 //! Pickles of Python, files of joblib and of `torch.save`, as data. No code of a file is run: a machine of this crate
-//! rebuilds numbers, texts, lists, dicts and arrays, and keeps objects of other classes by their names alone.
+//! rebuilds numbers, texts, lists, dicts and arrays; of an object of another class it keeps only the name of the class.
 //!
-//! `machine` carries out the opcodes, and its children `arrays`, `joblib` and `torch` make arrays; `globals` has the names that
-//! mean something. `values` lists the values as named arrays, as those of an NPZ file, so that whatever is known of arrays'
-//! names there is known here. `format` makes clips of them.
+//! `machine` carries out the opcodes, and its children `arrays`, `joblib` and `torch` make arrays; `globals` has the
+//! names of the classes and functions that are known. `values` lists the values as named arrays, like those of an NPZ
+//! file, so that both use the same code for the names of arrays. `format` makes clips of them.
 
 pub mod format;
 mod globals;

@@ -58,7 +58,7 @@ names! {
 }
 
 impl Role {
-    /// Whether a human skeleton has it in any case.
+    /// Whether every human skeleton has this part.
     #[must_use]
     pub fn is_required(self) -> bool {
         !matches!(
@@ -73,7 +73,7 @@ impl Role {
         )
     }
 
-    /// The role above it; those that are not required may be missing between them.
+    /// The role of the next part towards the hips. In a skeleton, parts that are not required may be missing.
     fn above(self) -> Option<Self> {
         Some(match self {
             Self::Hips => return None,
@@ -237,8 +237,9 @@ pub fn missing_text(missing: &[&str]) -> String {
     }
 }
 
-/// The axis along which a body stands: that of the direction from the feet to the head, on average over the positions of
-/// all joints in some poses. `None` if no axis is clear, as if it crawls on all fours along a diagonal, or lies.
+/// The axis along which a body stands: that of the direction from the feet to the head, on average over the positions
+/// of all joints in some poses. `None` if no axis is clear, for example if the body crawls on all fours along a
+/// diagonal, or lies.
 #[must_use]
 pub fn standing_axis<P: AsRef<[DVec3]>>(
     roles: &Roles,
@@ -258,7 +259,7 @@ pub fn standing_axis<P: AsRef<[DVec3]>>(
     });
     axes.sort_by(by_length);
     let [axis, second, _] = axes;
-    // The other axes are those of how it leans.
+    // The components along the other two axes come from leaning. If one of them is large, the upward axis is not clear.
     let is_clear = along(&axis) > 2.0 * along(&second);
     is_clear.then(|| axis * sum.dot(axis).signum())
 }
@@ -270,7 +271,8 @@ fn found(scheme: &Scheme, joint_names: &[String], parents: &[Option<usize>]) -> 
             .position(|joint| without_prefix(joint) == name)
     };
     let mut joints = scheme.names.map(named);
-    // The nearest joint above that has a role must have the next role above that the skeleton has.
+    // A joint is in the right place if, of the joints above it, the nearest one with a role has the role that is
+    // expected: the next higher role that the skeleton has.
     let is_placed = |role: Role| {
         let Some(joint) = joints[role as usize] else {
             return false;

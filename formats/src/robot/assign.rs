@@ -24,17 +24,17 @@ use crate::warnings::{Warnings, listed};
 /// The largest distance of a body from where its joints put it, in metres.
 const FITS: f64 = 1e-3;
 
-/// An order of bodies, and of bodies with the same parent.
+/// An order of bodies, with the order of bodies that have the same parent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct ListedOrder(BodyOrder, Siblings);
 
 /// How the joints and bodies of a file may belong to those of a robot.
 struct Candidate {
-    /// `None` where names say it.
+    /// `None` if names say it.
     listed: Option<ListedOrder>,
     /// The joint of each scalar, as [`Tree::scalar_joints`] counts them.
     joints: Vec<usize>,
-    /// The body of each of the file's.
+    /// For each body of the file, the body of the robot.
     bodies: Vec<Option<usize>>,
     quaternions: ComponentOrder,
 }
@@ -208,7 +208,7 @@ fn scalars_of_robot<'a>(
     if all.iter().any(|(_, keys)| joints.contains(keys.name)) {
         return Ok(all);
     }
-    // The joints of each group, by what stands before their names.
+    // The joints of each group; a group is the joints whose names have the same prefix, such as `action.`.
     let mut groups: BTreeMap<&str, HashSet<&str>> = BTreeMap::new();
     for (_, keys) in &all {
         let mut points = keys.name.match_indices('.');
@@ -225,7 +225,7 @@ fn scalars_of_robot<'a>(
         groups.values().flatten().all(|joint| all.insert(*joint))
     };
     if !is_unambiguous(&groups) {
-        // The actions are what was commanded, and the states what the robot did.
+        // Actions are commands to the robot, states are its measured motion. If the file has both, the states are used.
         groups.retain(|group, _| !group.starts_with("action"));
     }
     if !is_unambiguous(&groups) {
@@ -334,8 +334,9 @@ fn valued_scalars<'a>(
     valued
 }
 
-/// The whole turns nearest to the middle of some angles, if without them the largest angle is less than half as large, or
-/// smaller and otherwise in coarse steps: angles near 0 keep the digits of the file.
+/// The whole turns nearest to the middle of some angles, to be subtracted from them. `None` unless the largest
+/// magnitude then becomes less than half, or becomes smaller and was so large that f32 has coarse steps there. So
+/// angles near 0 keep the digits of the file.
 fn whole_circles(angles: &[f64]) -> Option<f64> {
     let [low, high] = [f64::min, f64::max].map(|pick| angles.iter().copied().reduce(pick));
     let (low, high) = (low?, high?);
@@ -650,8 +651,8 @@ fn joints_by_name(
     })
 }
 
-/// The tree of a file that has as many bodies as the robot without those that have no joints, as programs have them that
-/// merge these into others; and the robot's body of each of its own.
+/// The tree without the bodies that have no joints, and for each of its bodies the index of the robot's body. Some
+/// programs merge such bodies into others. `None` unless the file has exactly as many bodies as this tree.
 fn merged_bodies(robot: &Robot, recorded: Option<&RecordedBodies>) -> Option<(Tree, Vec<usize>)> {
     let kept = kept_bodies(&robot.tree);
     let is_merged = recorded?.count == kept.len() && kept.len() < robot.tree.bodies().len();
@@ -659,7 +660,7 @@ fn merged_bodies(robot: &Robot, recorded: Option<&RecordedBodies>) -> Option<(Tr
     Some((merged.tree, kept))
 }
 
-/// The body of each body of the file: by its name, or else in an order.
+/// For each body of the file, its index in the tree: by its name, or else in the order `order`.
 fn bodies_of(
     tree: &Tree,
     recorded: Option<&RecordedBodies>,
@@ -685,7 +686,7 @@ fn error(
     recorded: &RecordedBodies,
     candidate: &Candidate,
 ) -> Option<f64> {
-    // The rotation of the first body is in the file.
+    // The comparison needs the rotation of the first body, which the file must contain, and at most one free joint.
     (candidate.bodies.first() == Some(&Some(0)) && tree.counts().free < 2).then_some(())?;
     let mut largest: f64 = 0.0;
     for sample in &recorded.samples {

@@ -165,7 +165,7 @@ pub enum BodiesError {
         excess.joint, excess.excess, excess.unit, excess.sample
     )]
     OutsideLimits {
-        /// The joint and by how much.
+        /// The joint, and by how much its value is outside.
         excess: LimitExcess,
     },
 }
@@ -192,7 +192,7 @@ pub fn unwrap_joint(tree: &Tree, joint: &str, values: &mut [f64]) {
     let is_endless = tree.scalar_joints().any(|known| {
         known.name == joint && known.kind == JointKind::Hinge && known.limits.is_none()
     });
-    /// More than the rounding of a turn to f32.
+    /// This exceeds the rounding of a full turn to f32.
     const ROUNDING: f64 = 1e-5;
     let [low, high] = [f64::min, f64::max].map(|pick| values.iter().copied().reduce(pick));
     let may_be_wrapped = (low.zip(high)).is_some_and(|(low, high)| high - low <= TAU + ROUNDING);
@@ -380,8 +380,8 @@ fn walk_all(
     )
 }
 
-/// The points of bodies whose velocities are asked for: centres of mass, in the order of [`Tree::bodies`], or none for
-/// origins.
+/// The points of bodies whose velocities are computed: centres of mass in the order of [`Tree::bodies`]; empty for the
+/// origins of bodies.
 ///
 /// # Errors
 /// When the file does not say where a body's centre of mass is.
@@ -459,7 +459,7 @@ pub fn scalar_excesses(clip: &Motion, values: &[f32]) -> Vec<LimitExcess> {
     excesses
 }
 
-/// Keeps the scalars of a clip inside their limits; where they are outside, what changes (`rates`) is 0.
+/// Keeps the scalars of a clip inside their limits. If a scalar was outside, its velocity in `rates` becomes 0.
 pub fn clamp_scalars(clip: &Motion, values: &mut [f32], mut rates: Option<&mut [f32]>) {
     let count = clip.set.scalar_count().max(1);
     for (at, value) in values.iter_mut().enumerate() {

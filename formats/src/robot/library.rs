@@ -15,14 +15,14 @@ pub const LARGEST_ANGLE: f64 = 4096.0;
 #[derive(Debug, Clone)]
 pub struct RobotTracks<'a> {
     tree: &'a Tree,
-    /// Tracks of rotations, each with the names that it may have and the pose at which it rests. The first is that of the
-    /// base, if a clip moves it.
+    /// Tracks of rotations, each with its name and its rest pose. The first track is the base, if a clip moves the
+    /// base.
     moving: Vec<(String, BodyPose)>,
     has_base: bool,
     scalars: ScalarTracks,
 }
 
-/// Why a clip is none of a robot's library.
+/// Why a clip cannot be part of a robot's library.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RobotClipError {
@@ -33,7 +33,7 @@ pub enum RobotClipError {
     LargeAngle {
         /// The joint.
         joint: String,
-        /// The angle that its body turns by.
+        /// The angle by which its body is rotated.
         angle: f64,
     },
     /// The keys are none of a set.

@@ -1,5 +1,5 @@
-//! MJCF, `MuJoCo`'s XML. The rules are those of its documentation (`XMLreference`, `modeling`); of the elements that do
-//! not move frames none is read.
+//! MJCF, `MuJoCo`'s XML. The rules are those of its documentation (`XMLreference`, `modeling`). Elements that do not
+//! move frames are not read.
 
 use std::collections::HashMap;
 use std::f64::consts::PI;
@@ -40,7 +40,7 @@ struct Reader<'a> {
 /// One rotation of a sequence of Euler angles.
 struct EulerAxis {
     axis: DVec3,
-    /// About the axis as the rotations before have turned it; else about the fixed axis.
+    /// Whether the rotation is about the axis as rotated by the rotations before it, instead of about the fixed axis.
     is_intrinsic: bool,
 }
 

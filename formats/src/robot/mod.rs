@@ -37,7 +37,7 @@ pub struct Robot {
     pub format: RobotFormat,
     /// Its bodies and joints. The bodies are in the order of `MuJoCo`: depth first, children as in the file.
     pub tree: Tree,
-    /// The mass of each body in kilograms; `None` where the file does not say it.
+    /// The mass of each body in kilograms; `None` if the file does not state it.
     pub masses: Vec<Option<f64>>,
     /// The bodies of the file that are parts of others ([`Robot::merged`]).
     pub merged: Vec<String>,
@@ -82,7 +82,7 @@ fn limits() -> Limits {
     }
 }
 
-/// The files that an MJCF includes, relative to its folder; none where it cannot be read.
+/// The files that an MJCF includes, relative to its folder; none if it cannot be read.
 pub(crate) fn included_files(path: &Path) -> Vec<PathBuf> {
     Files::open(path, limits()).map_or(Vec::new(), Files::into_included)
 }

@@ -313,7 +313,7 @@ fn scalar_columns(clips: &[SampledClip<'_>]) -> Vec<(String, bool)> {
     all
 }
 
-/// For each column of scalars the scalar of a clip; `None` if the clip has none of this name and kind.
+/// For each column of scalars, the index of the clip's scalar; `None` if the clip has no scalar of this name and kind.
 fn scalars_of(sampled: &SampledClip<'_>, columns: &[(String, bool)]) -> Vec<Option<usize>> {
     let named = sampled.clip.scalar_keys().enumerate();
     let named = named.map(|(index, keys)| sampled.clip.scalar(index).kind.column(keys.name));
@@ -336,7 +336,7 @@ struct RowNumbers {
     rotation: Quat,
     translation: DVec3,
     scale: Vec3,
-    /// NaN where the clip has none.
+    /// NaN if the clip has none.
     scalars: Vec<f64>,
 }
 
@@ -445,7 +445,8 @@ fn write_track(
             rotation: at(&rotations, key).unwrap_or(Quat::IDENTITY),
             translation: clip.origin(track) + vector(Channel::Translation, key).as_dvec3(),
             scale: vector(Channel::Scale, key),
-            // Clips with scalars are written by samples.
+            // No clip with scalars is written here: such clips are written as samples. Scalars of other clips are
+            // missing in this one.
             scalars: vec![f64::NAN; columns.scalars.len()],
         };
         columns.push(&row, batch);

@@ -793,8 +793,9 @@ fn angles_hint(names: &ColumnNames<'_>) -> Option<String> {
     ))
 }
 
-/// Tracks of which `--map` says the rotations, and those of columns with their names. `hand.translation` and
-/// `hand.scale` belong to the track `hand`, and so do columns `hand.tx`; `tx` alone belongs to the only track.
+/// The tracks whose rotations `--map` names, with the translations and scales that belong to them: entries
+/// `hand.translation` and `hand.scale`, and columns such as `hand.tx`, belong to the track `hand`. A column `tx`
+/// belongs to the only track.
 fn mapped_rows(names: &mut ColumnNames<'_>, entries: &[Entry]) -> Result<RowLayout, Diagnostic> {
     const VECTORS: [&str; 2] = [".translation", ".scale"];
     let vector_of = |target: &str| {

@@ -54,7 +54,7 @@ impl<T: Copy + Zeroable> Blocks<T> {
     /// All values, one column after another.
     pub(crate) fn into_columns(self) -> Vec<T> {
         let rows = self.rows();
-        // Zeroed memory from the system is not touched before it is needed.
+        // The system provides zeroed memory only when it is first used, so this takes no time here.
         let mut columns: Vec<T> = bytemuck::zeroed_vec(rows * self.width);
         let mut row = 0;
         for block in self.blocks {

@@ -32,7 +32,8 @@ impl LastNumbers {
         let (start, decimals) = last_number(line)?;
         let all = &self.decimals[..self.count.min(LINES)];
         let is_shorter = all.len() >= LEAST && all.iter().all(|&other| decimals < other);
-        // A rotation such as `0 0 0 1` is short throughout; where a number is cut, those before it are whole.
+        // In a rotation such as `0 0 0 1` all numbers are short, so the last one is not cut. If it was cut, the numbers
+        // before it have more digits.
         let is_short = |end: usize| {
             let before = last_number(without_separators(&line[..end]))?;
             (before.1 <= decimals).then_some(before.0)
@@ -60,7 +61,8 @@ pub(crate) fn cut(text: &[u8]) -> Option<(u64, u64)> {
     Some((above as u64 + 1, column))
 }
 
-/// Where the number at the end of a line begins, and how many digits it has after the point, those of an exponent included.
+/// The start of the number at the end of a line, and its number of digits after the point, including the digits of an
+/// exponent.
 fn last_number(line: &[u8]) -> Option<(usize, usize)> {
     let line = line.strip_suffix(b"\r").unwrap_or(line);
     let is_comment = line.trim_ascii_start().starts_with(b"#");

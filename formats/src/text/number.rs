@@ -197,7 +197,7 @@ mod tests {
         }
     }
 
-    /// The short way and Rust's parser give the same bits, on either side of where it ends.
+    /// The fast path and Rust's parser give the same bits, on both sides of the limit of the fast path.
     #[test]
     fn short_decimals_have_the_bits_of_the_parser() {
         let mut state = 1u64;

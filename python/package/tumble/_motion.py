@@ -83,7 +83,7 @@ _ALL: tuple[_Name, ...] = (*_NAMES, *_SCALARS, *_BODIES)
 _SHAPES: dict[str, tuple[int, ...]] = {"quaternion": (4,), "matrix": (3, 3), "6d": (6,), "rotvec": (3,)}
 # Arrays in a file start at a multiple of this [bytes]: the alignment of every processor, and a cache line.
 _ALIGNED = 64
-# The latest version, which files with mirrored clips have.
+# The latest version of the file format; files with mirrored clips have it.
 _VERSION = 3
 # Members of every file, in addition to those that the extension module requires.
 _STORED = ("version", "method", "names", "lengths", "rates")
@@ -288,19 +288,20 @@ class _Scalars:
 class MotionLibrary(Generic[_A]):
     """Clips of one skeleton, of any lengths and rates, which can be sampled at any times.
 
-    `clips`: a list of `Clip`s with the same joints, in any order: they are matched by name, by index only if no clip
-    has names, and another name, number or parent is refused. `method`: the interpolation method, with the same names
-    as in `Engine.evaluate`. `skeleton`: a `Clip`, a file with one, or the parents and offsets of the tracks of the first
-    clip; its offsets are then those of all clips. Without it the skeleton is that of the first clip, and each clip
-    keeps its own offsets. Arrays have the joints in the order of the skeleton (`joint_names`). `names`: the names of
-    the clips; by default the names that they have, or those of their files. `engine`: its threads are used; by default
-    those of an engine that all calls share. `on_error`: "refuse", or "skip": clips that do not fit the skeleton are
-    left out, and `skipped` lists them. `packed`: with slerp, keys of rotations take 8 bytes instead of 16; rotations
-    are then within 1e-5 rad of the exact ones, each relative to its parent.
-
-    `device`: a Vulkan device, by the name that `Engine` takes, or an engine on one. The clips then lie in its memory,
-    and `sample` returns `DeviceArray`s, with the CPU's bits. A library that needs more memory than the device has is
-    refused. "cpu" is the same as no device.
+    * `clips`: a list of `Clip`s with the same joints, in any order. Joints are matched by name, or by index if no
+      clip has names. A clip with another name, number or parent of joints is refused.
+    * `method`: the interpolation method, with the same names as in `Engine.evaluate`.
+    * `skeleton`: a `Clip`, a file with one, or the parents and offsets of the tracks of the first clip; its offsets
+      are then those of all clips. Without it the skeleton is that of the first clip, and each clip keeps its own
+      offsets. Arrays have the joints in the order of the skeleton (`joint_names`).
+    * `names`: the names of the clips; by default the names that they have, or those of their files.
+    * `engine`: its threads are used; by default those of an engine that all calls share.
+    * `on_error`: "refuse", or "skip": clips that do not fit the skeleton are left out, and `skipped` lists them.
+    * `packed`: with slerp, keys of rotations take 8 bytes instead of 16; rotations are then within 1e-5 rad of the
+      exact ones, each relative to its parent.
+    * `device`: a Vulkan device, by the name that `Engine` takes, or an engine on one. The clips are then in its
+      memory, and `sample` returns `DeviceArray`s, with the CPU's bits. A library that needs more memory than the
+      device has is refused. "cpu" is the same as no device.
 
     A clip without offsets, such as an SMPL body without a model of its shape, has rotations only: its positions and
     velocities are refused.
@@ -432,7 +433,7 @@ class MotionLibrary(Generic[_A]):
         kept = [index for index in range(len(clips)) if index not in left_out]
         self.names = [all_names[index] for index in kept]
         self.paths = [os.fspath(clips[index].path or "") for index in kept]
-        # By these shards divide clips: the index of each in the list, or that of its file among all files.
+        # The numbers by which shards divide clips: the index of a clip in the list, or of its file among all files.
         self._shard_indices = np.array(kept, np.int64)
         self._skipped_indices = list(left_out)
         self.lengths = np.array([clips[index].duration for index in kept])
@@ -449,7 +450,7 @@ class MotionLibrary(Generic[_A]):
         }
         self._file: str | None = None
         self._only: NDArray[np.int64] | None = None
-        # The indices in the library's file.
+        # The indices of the clips in the library's file.
         self._in_file: NDArray[np.int64] | None = None
         self._mirrored: _Mirrored | None = None
         self._put_on(device)
@@ -530,21 +531,24 @@ class MotionLibrary(Generic[_A]):
         """Reads motion files: a path, a pattern such as "amass/**/*.npz", or a list of them, on all threads. Every clip
         of every file belongs to the library, in the order of the file names.
 
-        `fps`: clips are sampled at this rate by `method`; an incomplete frame at the end is left out. `tracks`: the names
-        or the indices of joints, in the order of the results; their parents must be included, too, unless `collapse`, which
-        adds the motion of joints that are left out to their children, as `Clip.select`, at the frames of `fps`. Numbers of
-        other joints that are not finite are no errors. `shard`: read only the files for one of several processes, as
-        (rank, processes): the library is then `load(…).shard(rank, processes)`. For the order of the joints, the first file of
-        all is read, too, unless `skeleton` has it.
-
-        `options`: the keywords of `tumble.load`, for each file, such as `source_fps`, `up`, `scale`, `offsets`,
-        `body_model` and `map`. With `tracks`, `offsets` has a row for each selected joint, in the order of `tracks`, or a
-        row for each joint of the file, in the order of the file; the number of rows tells which. Or `offsets` is a dict by
-        names. With `collapse`, it has all joints of the file. `on_error`: "refuse" ends at the first file that cannot be
-        read; "skip" leaves out such files, and clips that do not fit the skeleton, and lists them in `skipped`. Files of AMASS without a motion
-        (`shape.npz`, `*_stagei.npz`) are left out, too. `progress`: a bar such as `tqdm.tqdm` or an instance of it, or a
-        function, which is called with the number of files read so far and of all. `packed`, `device`, and `robot` with what
-        belongs to it: as of the class.
+        * `fps`: clips are sampled at this rate by `method`; an incomplete frame at the end is left out.
+        * `tracks`: the names or the indices of joints, in the order of the results. Their parents must be included,
+          too, unless `collapse` is set. Numbers of other joints that are not finite are no errors.
+        * `collapse`: the motion of joints that are left out is added to their children, as in `Clip.select`, at the
+          frames of `fps`.
+        * `shard`: read only the files for one of several processes, as (rank, processes): the library is then
+          `load(…).shard(rank, processes)`. For the order of the joints, the first file of all is read, too, unless
+          `skeleton` has it.
+        * `options`: the keywords of `tumble.load`, for each file, such as `source_fps`, `up`, `scale`, `offsets`,
+          `body_model` and `map`. With `tracks`, `offsets` has a row for each selected joint, in the order of `tracks`,
+          or a row for each joint of the file, in the order of the file; the number of rows decides which. Or `offsets`
+          is a dict by names. With `collapse`, it has all joints of the file.
+        * `on_error`: "refuse" ends at the first file that cannot be read. "skip" leaves out such files, and clips that
+          do not fit the skeleton, and lists them in `skipped`. Files of AMASS without a motion (`shape.npz`,
+          `*_stagei.npz`) are left out, too.
+        * `progress`: a bar such as `tqdm.tqdm` or an instance of it, or a function, which is called with the number of
+          files read so far and of all.
+        * `packed`, `device`, `robot` and the parameters for robots: as for the class.
 
         >>> import tempfile, os, tumble
         >>> folder = tempfile.mkdtemp()
@@ -598,7 +602,7 @@ class MotionLibrary(Generic[_A]):
                 raise InputError(f"no file could be read; the first: {skipped[0][1].message}")
             if shard is not None:
                 raise InputError(f"shard: none of the {len(paths)} files is for process {rank} of {processes}")
-        # The joints have the order of the first clip of all files, whichever process it belongs to.
+        # The joints have the order of the first clip of all files, also in processes that do not read this clip.
         before: list[tuple[int, Clip]] = []
         if skeleton is None and robot is None:
             for index in range(clips[0][0] if clips else 0):
@@ -890,18 +894,21 @@ class MotionLibrary(Generic[_A]):
         its last one, the pose is that of this key, and the velocities are those at this key, not 0. (`Engine.velocity` and
         scalars of an `Engine` give 0 there.)
 
-        `arrays`: the names of those to compute, by default all; fewer arrays take less time. `out`: a state; the arrays
-        that it has are filled again. `finite`: velocities as differences of the two frames of the clip's rate around a
-        time, as other motion libraries have them, instead of the exact derivatives. `order`: of quaternions, by
-        default "xyzw"; that of a library with `robot` was stated when it was made. `rotations`: how both arrays of
-        rotations are stored: "quaternion" (…, 4), "matrix" (…, 3, 3) for column vectors, "6d" (…, 6), the first two
-        columns of the matrix (`six-columns` of docs/features.md), or "rotvec" (…, 3), axis times angle.
-
-        `heading`: states in the heading frame of the root, the first joint without a parent, instead of the world. The frame
-        is on the ground below the root, and has its heading: "twist", or that of its axis "x", "y" or "z", as
-        `features.heading`. `up`: the axis that points up, "y" or "z", which is needed then. Positions, velocities and
-        rotations in the world, and the `rotations` of roots, are expressed in the frame; the root is in place, as
-        `features.root_motion` computes it. Velocities stay those of the world: the frame does not move.
+        * `arrays`: the names of the arrays to compute, by default all; fewer arrays take less time.
+        * `out`: a state; the arrays that it has are filled again.
+        * `finite`: velocities as differences of the two frames of the clip's rate around a time, as other motion
+          libraries have them, instead of the exact derivatives.
+        * `order`: the order of the components of quaternions, by default "xyzw"; that of a library with `robot` was
+          stated when it was made.
+        * `rotations`: how both arrays of rotations are stored: "quaternion" (…, 4), "matrix" (…, 3, 3) for column
+          vectors, "6d" (…, 6), the first two columns of the matrix (`six-columns` of docs/features.md), or "rotvec"
+          (…, 3), axis times angle.
+        * `heading`: states in the heading frame of the root, the first joint without a parent, instead of the world.
+          The frame is on the ground below the root, and has its heading: "twist", or that of its axis "x", "y" or "z",
+          as `features.heading`. Positions, velocities and rotations in the world, and the `rotations` of roots, are
+          expressed in the frame; the root is in place, as `features.root_motion` computes it. Velocities stay those of
+          the world: the frame does not move.
+        * `up`: the axis that points up, "y" or "z", which `heading` needs.
 
         A library on a device returns new `DeviceArray`s, with `rotations` "quaternion", "matrix" or "6d"; `out`, `order`
         and `heading` are for the CPU alone. `clip_ids` and `times` are read by the host; arrays of a device are copied to it
@@ -997,7 +1004,7 @@ class MotionLibrary(Generic[_A]):
         if self._bodies:
             self._fill_bodies(ids, moments, finite, filled)
             return out
-        # Quaternions that the result does not have, or has in another representation.
+        # Quaternions that are needed but not requested, or requested in another representation.
         quaternions = {
             name: _aligned((ids.size, self._motions.joints, 4))
             for name in ("rotations", "world_rotations")

@@ -378,10 +378,10 @@ class Clip:
     @staticmethod
     def concat(clips: Sequence[Clip], *, gap: float | None = None) -> Clip:
         """Several clips, one after another. Joints are matched by name, and have the order and the name of the first clip.
-        `gap`: the seconds from the last key of a clip to the first key of the next; by default one frame, if the clips have
-        a common rate. With `gap=0.0`, one clip ends in the pose in which the next begins, which is kept once. All keys
-        keep their bits, and those of the first clip their times. Clips that differ in their joints, offsets, scalars or
-        interpolation are refused."""
+        `gap`: the seconds from the last key of a clip to the first key of the next; by default one frame, if the clips
+        have a common rate. With `gap=0.0`, each clip must end in the pose in which the next one begins; the two poses
+        become one key. All keys keep their bits, and those of the first clip their times. Clips that differ in their
+        joints, offsets, scalars or interpolation are refused."""
     def root_motion(
         self,
         rule: Literal["keep", "in-place", "extract"],
@@ -648,10 +648,10 @@ class Engine:
         continuity: float | None = None,
         bias: float | None = None,
     ) -> _Single:
-        """The angular velocity of every track at every sample: float32, (tracks, frames, 3) in rad/s,
-        about the axes of the "body" or of its "parent", or in the "world": that of the rotation in the world,
-        along the skeleton, about the world's axes. Of a track without a parent the last two are the same. Other
-        keywords are those of `evaluate`."""
+        """The angular velocity of every track at every sample: float32, (tracks, frames, 3) in rad/s, about the axes of
+        the "body" or of its "parent". With "world" it is the angular velocity of the joint in the world, along the
+        skeleton, about the world's axes. For a track without a parent, "parent" and "world" are the same. All other
+        keywords are as in `evaluate`."""
     @overload
     def velocity(
         self,

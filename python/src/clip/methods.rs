@@ -494,10 +494,10 @@ impl Clip {
     }
 
     /// Several clips, one after another. Joints are matched by name, and have the order and the name of the first clip.
-    /// `gap`: the seconds from the last key of a clip to the first key of the next; by default one frame, if the clips have
-    /// a common rate. With `gap=0.0`, one clip ends in the pose in which the next begins, which is kept once. All keys
-    /// keep their bits, and those of the first clip their times. Clips that differ in their joints, offsets, scalars or
-    /// interpolation are refused.
+    /// `gap`: the seconds from the last key of a clip to the first key of the next; by default one frame, if the clips
+    /// have a common rate. With `gap=0.0`, each clip must end in the pose in which the next one begins; the two poses
+    /// become one key. All keys keep their bits, and those of the first clip their times. Clips that differ in their
+    /// joints, offsets, scalars or interpolation are refused.
     ///
     /// >>> import tumble
     /// >>> clip = tumble.Clip([0.0, 1.0, 2.0], [[0, 0, 0, 1], [1, 0, 0, 0], [0, 1, 0, 0]])

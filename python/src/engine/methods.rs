@@ -135,25 +135,34 @@ impl Engine {
     /// The rotation of every track at every sample, written by the engine into NumPy's memory:
     /// float32, (tracks, frames, 4), unit quaternions.
     ///
-    /// Which samples: `fps`, a rate (use "30000/1001", not 29.97), with `start` and
-    /// `end` in seconds, else from the first key to the last; or `at` (or `times`) in seconds, in any
-    /// order: one list for all tracks, (tracks, frames), or a list with an array for each track. A
-    /// single time gives a result without the axis of frames; lists of different lengths give a
-    /// list of arrays.
+    /// Which samples are evaluated:
     ///
-    /// `out`: a C-contiguous array of the result's type and shape, which is filled and returned.
-    /// `order`: "xyzw" or "wxyz", of the result. `layout`: "frame" gives (frames, tracks, 4).
-    /// `as_rotation`: a `Rotation` of SciPy's for each track. `dtype`: "float16" has half the size, within
-    /// 2.5e-4 of each component; "int16", to be divided by 32767, within 1.6e-5.
+    /// * `fps`: the frames of this rate (use "30000/1001", not 29.97), with `start` and `end` in seconds; by default
+    ///   from the first key to the last.
+    /// * `at` (or `times`): times in seconds instead, in any order: one list for all tracks, (tracks, frames), or a
+    ///   list with an array for each track. A single time gives a result without the axis of frames; lists of different
+    ///   lengths give a list of arrays.
     ///
-    /// `device_array`: the result stays on the NVIDIA card that makes it, as a `DeviceArray` that torch, CuPy and JAX
-    /// take without a copy. Raises `DeviceError` if this is not possible.
+    /// The form of the result:
     ///
-    /// Other options: `method` ("authored": the interpolation that the file states for each channel, slerp
-    /// for BVH, bessel-overhauser for others that state none; see `tumble.methods()`), `signs` ("shortest",
-    /// "as-authored"), `ends` ("parabolic", "natural", "clamped", "secant", "loop", "frozen", or angular
-    /// velocities (2, 3), rad/s), `speed` ("as-keyed", "constant"), `before` and `after` ("hold", "loop",
-    /// "mirror", "extrapolate", "leave-out": no samples there), `tension`, `continuity`, `bias`.
+    /// * `out`: a C-contiguous array of the result's type and shape, which is filled and returned.
+    /// * `order`: the order of the result's components, "xyzw" or "wxyz".
+    /// * `layout`: "frame" gives (frames, tracks, 4).
+    /// * `as_rotation`: a `Rotation` of SciPy's for each track.
+    /// * `dtype`: "float16" has half the size, within 2.5e-4 of each component; "int16", to be divided by 32767, within
+    ///   1.6e-5.
+    /// * `device_array`: the result stays on the NVIDIA card that makes it, as a `DeviceArray` that torch, CuPy and JAX
+    ///   take without a copy. Raises `DeviceError` if this is not possible.
+    ///
+    /// The interpolation:
+    ///
+    /// * `method`: "authored" is the interpolation that the file states for each channel. If the file states none, it
+    ///   is slerp for BVH and bessel-overhauser for other formats. See `tumble.methods()`.
+    /// * `signs`: "shortest" or "as-authored".
+    /// * `ends`: "parabolic", "natural", "clamped", "secant", "loop", "frozen", or angular velocities (2, 3) in rad/s.
+    /// * `speed`: "as-keyed" or "constant".
+    /// * `before` and `after`: "hold", "loop", "mirror", "extrapolate" or "leave-out" (no samples there).
+    /// * `tension`, `continuity` and `bias`.
     ///
     /// >>> import numpy as np, tumble
     /// >>> clip = tumble.Clip([0.0, 1.0], [[0, 0, 0, 1], [0, 0, 1, 0]])
@@ -269,10 +278,10 @@ impl Engine {
         )
     }
 
-    /// The angular velocity of every track at every sample: float32, (tracks, frames, 3) in rad/s,
-    /// about the axes of the "body" or of its "parent", or in the "world": that of the rotation in the world,
-    /// along the skeleton, about the world's axes. Of a track without a parent the last two are the same. Other
-    /// keywords are those of `evaluate`.
+    /// The angular velocity of every track at every sample: float32, (tracks, frames, 3) in rad/s, about the axes of
+    /// the "body" or of its "parent". With "world" it is the angular velocity of the joint in the world, along the
+    /// skeleton, about the world's axes. For a track without a parent, "parent" and "world" are the same. All other
+    /// keywords are as in `evaluate`.
     ///
     /// >>> import tumble
     /// >>> clip = tumble.Clip([0.0, 2.0], [[0, 0, 0, 1], [0, 0, 1, 0]])
@@ -634,10 +643,13 @@ impl Engine {
     /// with inverse bind matrices `B`, as vertices are skinned with. float32, (tracks, frames, 3, 4), for column
     /// vectors, the last column the translation; a view.
     ///
-    /// `rotations`: (tracks, frames, 4), or of one pose (tracks, 4). `parents`: the index of each track's
-    /// parent, None or -1 for a root. `offsets`: (tracks, 3). `translations` replace them: like the
-    /// rotations with 3 components, or a list with (frames, 3) or None for each track. `scales`: likewise.
-    /// `inverse_bind`: (tracks, 3, 4) or (tracks, 4, 4).
+    /// * `rotations`: (tracks, frames, 4), or (tracks, 4) for one pose.
+    /// * `parents`: the index of each track's parent, None or -1 for a root.
+    /// * `offsets`: (tracks, 3).
+    /// * `translations`: replace the offsets. They have the shape of the rotations with 3 components instead of 4, or
+    ///   are a list with (frames, 3) or None for each track.
+    /// * `scales`: in the same form as translations.
+    /// * `inverse_bind`: (tracks, 3, 4) or (tracks, 4, 4).
     ///
     /// >>> import tumble
     /// >>> half = 0.5 ** 0.5
@@ -675,15 +687,20 @@ impl Engine {
 
     /// Bodies on paths: the position of each at every sample, and the rotation from its axes to the world's.
     ///
-    /// `points`: (points, 3), (tracks, points, 3), or a list with an array for each track; `times`: seconds of the
-    /// points, or None with `duration` in seconds, or `rate`, the distance covered in a second. `ups`: upward
-    /// directions at the points, like them. `method`: the curve through the points. `ahead`: the body faces the point
-    /// this far ahead instead of along the path; `look_at`: a point or a track's index that it faces. `frame`: how it
-    /// is rotated about its direction, "minimal", "fixed" or "frenet", with `up` at the start or everywhere. `twist`:
-    /// whether the rotation that remains after a closed path (`ends="loop"`) is spread ("spread") or stays ("free").
-    /// `speed`: "keys" or "as-keyed" (the default: the key times), "constant", or a pair of fractions of the duration:
-    /// over the first one the speed grows from 0, over the second one it falls to 0. `forward` and `upward`: axes of
-    /// the body, such as "-x".
+    /// * `points`: (points, 3), (tracks, points, 3), or a list with an array for each track.
+    /// * `times`: seconds of the points; or None with `duration` in seconds or with `rate`, the distance covered in a
+    ///   second.
+    /// * `ups`: upward directions at the points, in the same form as `points`.
+    /// * `method`: the curve through the points.
+    /// * `ahead`: the body faces the point this far ahead instead of along the path; `look_at`: it faces a point, or
+    ///   the track with this index.
+    /// * `frame`: how the body is rotated about its direction, "minimal", "fixed" or "frenet", with the upward
+    ///   direction `up` at the start or everywhere.
+    /// * `twist`: whether the rotation that remains after a closed path (`ends="loop"`) is spread ("spread") or stays
+    ///   ("free").
+    /// * `speed`: "keys" or "as-keyed" (the default: the key times), "constant", or a pair of fractions of the
+    ///   duration: over the first one the speed grows from 0, over the second one it falls to 0.
+    /// * `forward` and `upward`: axes of the body, such as "-x".
     ///
     /// Gives positions (tracks, frames, 3), float32 (float64 far from 0), and rotations (tracks, frames, 4).
     ///

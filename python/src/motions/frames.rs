@@ -235,7 +235,8 @@ fn to_frame(
     each(states.world_rotations, at.clone(), |rows| {
         rows.iter_mut().for_each(of_rotation);
     });
-    // Those of other joints are relative to their parents, which the frame does not change.
+    // Only the rotations of roots are changed. Those of other joints are relative to their parents, so they are the
+    // same in every frame.
     each(states.rotations, at.clone(), |rows| {
         for state in rows.chunks_mut(parents.len()) {
             let roots = state

@@ -68,7 +68,7 @@ pub(crate) fn scalar_motions(
             let clip = |_: usize, listed: ListedClip<'_>| {
                 let motion = &listed.clip.motion;
                 let mut set = TrackSet::new();
-                // No scalar rests: every clip has all of them.
+                // The rest value 0 is never used, because every clip has all scalars.
                 let added = tracks.add_to(&mut set, motion, |_| 0.0);
                 added.map_err(|error| of_track(&error))?;
                 Ok(MotionClip {

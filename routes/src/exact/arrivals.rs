@@ -75,7 +75,7 @@ impl Arrivals {
         self.arrivals[vertex as usize] = arrival;
     }
 
-    /// Whether paths begin at the vertex that do not pass it within a window.
+    /// Whether paths begin at the vertex: paths that no window carries past the vertex.
     pub(super) fn is_source(&self, vertex: u32) -> bool {
         match self.kinds[vertex as usize] {
             VertexKind::Convex => false,

@@ -265,9 +265,10 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Compares two windows that enter through one edge and contain the opposite corner. The one that is longer there
-    /// continues on one side only: on the other side of the shorter one's ray its paths would have to cross that ray,
-    /// and would be longer after it (Chen and Han, 1996). Returns whether a window continues on each side.
+    /// Compares two windows that enter through one edge and contain the opposite corner. The window whose path to this
+    /// corner is longer continues on one side of the corner only. On the other side its paths would have to cross the
+    /// ray of the shorter path to the corner, and would be longer after it (Chen and Han, 1996). Returns whether a
+    /// window continues on each side.
     fn occupy(&mut self, half_edge: u32, length: f64, entry: f64, near: f64) -> (bool, bool) {
         let occupant = &mut self.occupants[half_edge as usize];
         if length < occupant.length {

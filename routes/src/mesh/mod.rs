@@ -129,7 +129,7 @@ impl Mesh {
     }
 
     /// The unit normal at each vertex: the mean of the normals of its faces, weighted by their angles at the vertex;
-    /// 0 where they cancel out. `None` if the surface has only one side.
+    /// 0 if they cancel out. `None` if the surface has only one side.
     #[must_use]
     pub fn normals(&self) -> Option<&[DVec3]> {
         self.surface.normals.as_deref()

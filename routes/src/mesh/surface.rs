@@ -51,7 +51,7 @@ impl Surface {
         between(&self.positions, spot)
     }
 
-    /// The unit normal at a spot; 0 where the normals of the faces cancel out.
+    /// The unit normal at a spot; 0 if the normals of the faces cancel out.
     pub(crate) fn normal(&self, spot: Spot) -> Option<DVec3> {
         let normals = self.normals.as_ref()?;
         Some(between(normals, spot).normalize_or_zero())

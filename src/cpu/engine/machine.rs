@@ -68,7 +68,7 @@ impl Machine for CpuEngine {
     }
 }
 
-/// Prepared tracks, which the CPU evaluates where they are.
+/// Prepared tracks, which the CPU evaluates without copying them.
 struct CpuClip {
     engine: Arc<CpuEngine>,
     data: Arc<ClipData>,

@@ -1,5 +1,5 @@
-//! The CPU as a device: its threads and its vector width, and evaluation of sets batch by batch: a thread prepares
-//! some intervals, evaluates them while their segments are in its cache, and drops them.
+//! The CPU as a device: its threads, its vector width, and the evaluation of sets batch by batch. For each batch, a
+//! thread prepares some intervals, evaluates them while their segments are in its cache, and drops them.
 
 pub(crate) mod clip;
 pub(crate) mod from_keys;
@@ -38,7 +38,8 @@ pub(crate) struct CpuEngine {
     pub(crate) scratch_pool: ScratchPool,
     /// The limit of the segments of a clip in bytes, if there is one.
     pub(crate) memory: Option<usize>,
-    /// Bytes of segments that a clip keeps although its samples can be computed from its keys.
+    /// The maximum size in bytes of the segments of a clip whose samples can be computed from its keys; a larger clip
+    /// keeps its keys instead.
     pub(crate) kept_segments: usize,
 }
 

@@ -47,11 +47,12 @@ impl Crowd {
 
     /// Prepares a stage that continues matrices in a range of the application's buffer, in place, in 32 bits.
     ///
-    /// A frame is then, for example: [`Crowd::record`] with a target for
-    /// [`CrowdValues::Local`](crate::crowd::CrowdValues::Local) in this range, the application's own commands that change
-    /// these matrices (inverse kinematics), and [`Crowd::record`] with the stage's target, which makes them skinning
-    /// matrices. The stage continues the matrices of as many instances as are [visible](Crowd::set_visible) when it is
-    /// recorded, whatever wrote them: a kernel, a copy, or the host before the commands are submitted.
+    /// A frame then has three parts, for example. [`Crowd::record`] with a target for
+    /// [`CrowdValues::Local`](crate::crowd::CrowdValues::Local) writes matrices into this range. Commands of the
+    /// application change these matrices (inverse kinematics). [`Crowd::record`] with the stage's target makes them
+    /// skinning matrices. The stage continues the matrices of as many instances as are [visible](Crowd::set_visible)
+    /// when it is recorded. A kernel, a copy, or the host before the commands are submitted may have written these
+    /// matrices.
     ///
     /// Results have the bits of the functions on the CPU that [`CrowdStage`] names, if all numbers are finite and less
     /// than 2^36 in magnitude. Where nothing was changed, they have the bits of an evaluation without stages.
@@ -110,18 +111,18 @@ impl Crowd {
     /// recorded.
     ///
     /// # Safety
-    /// The command buffer must belong to the engine's device and to the queue family of the engine's queue, and must
-    /// be in the recording state, outside a render pass. All recorded evaluations must be submitted to the engine's
-    /// queue, once and in the order in which they were recorded: the device stores the layers of instances, and would
-    /// miss the changes of a frame that is not submitted ([`Crowd::forget_recorded`]). The engine must not submit
-    /// while the application submits to this queue. Several targets may alternate. Two evaluations with one target
-    /// are executed in order on the queue.
+    /// The command buffer must belong to the engine's device and to the queue family of the engine's queue, and must be
+    /// in the recording state, outside a render pass. All recorded evaluations must be submitted to the engine's queue,
+    /// once and in the order in which they were recorded. Otherwise the device, which stores the layers of instances,
+    /// would miss the changes of the frames that are not submitted ([`Crowd::forget_recorded`]). The engine must not
+    /// submit while the application submits to this queue. Several targets may alternate. Two evaluations with one
+    /// target are executed in order on the queue.
     pub unsafe fn record(
         &mut self,
         target: &CrowdTarget,
         commands: vk::CommandBuffer,
     ) -> Result<(), CrowdError> {
-        // SAFETY: promised by the caller.
+        // SAFETY: as the caller promises.
         unsafe { self.record_between(target, commands, CommandScopes::default()) }
     }
 
@@ -152,7 +153,7 @@ impl Crowd {
             });
         }
         if instances > 0 {
-            // SAFETY: promised by the caller.
+            // SAFETY: as the caller promises.
             let commands = unsafe { Commands::new(&device.engine.device, commands) };
             let layers = self.layer_count();
             let commands = commands.between(scopes.with_earlier_recordings());

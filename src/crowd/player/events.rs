@@ -7,8 +7,9 @@ use crate::memory::reserved;
 use crate::shader::WEIGHT_UNIT;
 
 impl Crowd {
-    /// The events that the layers of all instances passed after the time `since` of the clock, up to its current time:
-    /// in the order of the times at which they were passed, then of instances, layers and events.
+    /// The events that the layers of all instances passed after the time `since` of the clock, up to its current time.
+    /// They are in the order of the times at which they were passed; at the same time, in the order of instances,
+    /// layers and events.
     ///
     /// A layer passes an event when its time in the clip reaches the event's tick, in either direction, and in a loop
     /// once in each round. Times are whole ticks, so that one large step passes the same events as many small ones. The

@@ -39,7 +39,7 @@ pub struct Crowd {
     pub(crate) instances: Instances,
     /// The push constants that all dispatches share.
     arguments: CrowdDispatch,
-    /// The crowd on the engine's machine; `None` where the host evaluates it.
+    /// The crowd on the engine's machine; `None` if the host evaluates it.
     pub(crate) device: Option<Box<dyn MachineCrowd>>,
     /// The submission whose result was not taken yet.
     submitted: Option<Submitted>,
@@ -107,7 +107,7 @@ impl Engine {
 }
 
 impl Crowd {
-    /// The tables on the engine's machine; `None` where the host evaluates.
+    /// The tables on the engine's machine; `None` if the host evaluates.
     fn uploaded(&self) -> Result<Option<Box<dyn MachineCrowd>>, CrowdError> {
         let (library, tables) = (&self.library, &self.library.tables);
         Ok(self.engine.machine.crowd(&CrowdSource {
@@ -465,7 +465,7 @@ impl Crowd {
     }
 
     /// Moves the clock forward by `seconds`, rounded to ticks. If steps are not whole numbers of ticks, the rounding
-    /// errors of many steps add up: if the clock must follow frames exactly, as in a film at 30000/1001 frames a
+    /// errors of many steps add up. If the clock must follow frames exactly, as in a film at 30000/1001 frames a
     /// second, use [`Crowd::set_clock`] with each frame's time.
     ///
     /// # Errors

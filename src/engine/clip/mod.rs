@@ -86,14 +86,15 @@ impl Clip {
 
     /// The memory that the clip takes on the host for each key, in bytes; 0 for a clip without keys.
     ///
-    /// By default a clip keeps a segment for each key: 64 bytes for an arc, and 144, 176 or 208 for a polynomial. The
-    /// smaller the rotation between two keys, the fewer coefficients of Catmull-Rom, Bessel-Overhauser, Hermite and
-    /// B-spline curves the CPU keeps; nearly all of their segments of recorded motion take 144 bytes. Other methods
-    /// mostly need all coefficients, and devices keep all. On the CPU a clip keeps its keys instead (16 bytes each, and
-    /// the key times, which tracks with the same times share) if its segments would take more memory than
-    /// [`EngineOptions::kept_segments`](crate::EngineOptions::kept_segments) or than the engine may use, and if samples
-    /// can be computed from the keys: for arcs, and for cubics that mostly rotate little between keys. Both limits are
-    /// compared with 208 bytes for each polynomial, because its coefficients are not known before.
+    /// By default a clip keeps a segment for each key. An arc takes 64 bytes, and a polynomial takes 144, 176 or 208
+    /// bytes. For Catmull-Rom, Bessel-Overhauser, Hermite and B-spline curves the CPU leaves out coefficients that are
+    /// 0. There are more of these if the rotation between two keys is small, so that nearly all segments of recorded
+    /// motion take 144 bytes. Other methods mostly need all coefficients, and devices keep all. On the CPU a clip keeps
+    /// its keys instead of segments if two conditions hold. First, the segments would take more memory than
+    /// [`EngineOptions::kept_segments`](crate::EngineOptions::kept_segments) or than the engine may use; here a
+    /// polynomial counts as 208 bytes, because its coefficients are not known before. Second, samples can be computed
+    /// from the keys: for arcs, and for cubics that mostly rotate little between keys. A key then takes 16 bytes. Its
+    /// time takes 8 bytes, once for all tracks with the same times.
     #[must_use]
     pub fn bytes_per_key(&self) -> f64 {
         let bytes = match &self.tracks {
@@ -202,7 +203,8 @@ impl Clip {
     }
 
     /// Prepares the evaluation of single samples and poses on the calling thread, with the bits of [`Clip::evaluate`]
-    /// at listed times. A clip on a Vulkan device is sampled on the host, too, which keeps what is needed for it.
+    /// at listed times. A clip on a Vulkan device is sampled on the host, too; the sampler keeps the data that this
+    /// needs in the host's memory.
     ///
     /// # Errors
     /// When the segments of the clip exceed the engine's memory limit, and samples cannot be computed from the keys of

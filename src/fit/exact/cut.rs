@@ -29,8 +29,8 @@ pub(crate) struct Subcurve {
     /// The start and the length of its interval in seconds.
     interval: (f64, f64),
     pub(crate) piece: CurvePiece,
-    /// Its index among the segments, chosen when it is fitted; `None` after that if it is one of the finest pieces
-    /// and does not fit.
+    /// Its index among the segments, which is chosen when it is fitted; `None` afterwards if it is one of the smallest
+    /// pieces and does not fit.
     pub(crate) segment: Option<usize>,
 }
 
@@ -121,7 +121,7 @@ impl Cutter {
             done = some.end;
         }
         self.waiting.clear();
-        // Most subcurves are in order already.
+        // The sort is fast, because most subcurves are in order already.
         let times = |subcurve: &Subcurve| subcurve.piece.extent().0;
         self.subcurves.sort_by(|a, b| {
             let by_time = || times(a).total_cmp(&times(b));

@@ -241,7 +241,7 @@ impl<L: Lanes> Expanded<L> {
     /// The differences of the rotations at `s` from those at the middle.
     #[inline(always)]
     fn differences<const SHORT: bool>(&self, s: L) -> [L; 4] {
-        // Written out: closures are not always inlined.
+        // Written out without a closure, because closures are not always inlined.
         self.curve.differences([
             self.sine_cosine::<SHORT>(0, s),
             self.sine_cosine::<SHORT>(1, s),

@@ -39,7 +39,7 @@ pub(crate) fn short_exp<N: Number>(v: [N; 3]) -> FromIdentity<N> {
     exp_from_identity(v, sine_cosm1_quarter(N::all(1.0), square(v)))
 }
 
-/// The same up to pi/2.
+/// The same for half-angles up to pi/2.
 #[inline(always)]
 pub(crate) fn long_exp<N: Number>(v: [N; 3]) -> FromIdentity<N> {
     exp_from_identity(v, sine_cosm1(N::all(1.0), square(v)))

@@ -1,5 +1,5 @@
-//! The ranges of a curve that one polynomial fits, and constants of the basis functions there:
-//! values and derivatives at the middle, and their gains from the middle to each node.
+//! The ranges of a curve that one polynomial fits, and constants of the basis functions there: values and derivatives
+//! at the middle, and their differences (gains) from the middle to each node.
 
 use crate::fit::nodes::{DEGREE_8_END_NODES, END_NODES, HALF_END_NODES, Nodes};
 

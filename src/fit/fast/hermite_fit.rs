@@ -166,7 +166,7 @@ fn backward<L: Lanes>([w1, w2, w3]: [[L; 3]; 3]) -> [[L; 3]; 3] {
     let last_rotations = composed(long_exp(w2), third_rotation);
     let v1 = inverse_rotated(w1, last_rotations);
     let v2 = inverse_rotated(w2, third_rotation);
-    // Written out: closures are not always inlined.
+    // Written out without a closure, because closures are not always inlined.
     [
         [-v1[0], -v1[1], -v1[2]],
         [-v2[0], -v2[1], -v2[2]],
@@ -233,7 +233,7 @@ const COSINE_MINUS_ONE: [f32; 3] = [-0.5, 0.041_666_105, -0.001_381_43];
 /// of its angle, by its gain.
 #[inline(always)]
 fn sines_cosines<L: Lanes>(gains: &[f32; 3], [first, second, third]: [L; 3]) -> [SineCosm1<L>; 3] {
-    // Written out: closures are not always inlined.
+    // Written out without a closure, because closures are not always inlined.
     [
         sine_cosine(gains[0], first),
         sine_cosine(gains[1], second),

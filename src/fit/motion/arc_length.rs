@@ -10,8 +10,8 @@ const PARTS: usize = 8;
 /// A curve that is slower than this fraction of its mean speed counts as at rest.
 const SLOW: f64 = 1e-4;
 
-/// The distance in the parameter from a point of rest at which the direction is computed: there, a curve that starts
-/// from rest has rotated by a billionth of its length, and its direction is known to seven digits.
+/// The distance in the parameter from a point of rest at which the direction is computed. At this distance, a curve
+/// that starts from rest has rotated by a billionth of its length, and its direction is known to seven digits.
 const NEXT_TO_REST: f64 = 1e-5;
 
 /// The maximum distance outside its interval to which a curve is followed, as a fraction of the interval.

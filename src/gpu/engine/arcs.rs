@@ -1,5 +1,5 @@
-//! Arcs that the device prepares: of an uploaded clip it gets the keys and the list of their intervals, and one
-//! dispatch for each group writes the segments that the host would have uploaded.
+//! Arcs that the device prepares. The host uploads the keys of a clip and the list of their intervals instead of
+//! segments, and one dispatch for each group writes these segments.
 
 use crate::gpu::buffer::{Buffer, Residence};
 use crate::gpu::device::QueueLane;
@@ -14,10 +14,11 @@ use crate::prepare::clip_data::ClipData;
 use crate::shader::{ArcsDispatch, Kernel};
 use crate::work::recording::{Slice, workgroups};
 
-/// Keys whose arcs a card prepares: 1 MiB of arcs. To copy fewer takes no longer than to wait for a dispatch.
+/// The number of keys from which on a card prepares the arcs: 1 MiB of arcs. The upload of fewer arcs takes no longer
+/// than a dispatch.
 const MANY_KEYS: usize = (1 << 20) / 32;
 
-/// Keys from which on the arcs between them are prepared on a device.
+/// The number of keys from which on the arcs between them are prepared on a device.
 pub(super) fn prepared_from(option: PrepareArcs, kind: DeviceKind) -> usize {
     match (option, kind) {
         (PrepareArcs::OnDevice, _) => 0,
@@ -27,7 +28,7 @@ pub(super) fn prepared_from(option: PrepareArcs, kind: DeviceKind) -> usize {
 }
 
 impl VulkanEngine {
-    /// Whether the arcs between so many keys are prepared on the device.
+    /// Whether the device prepares the arcs between `keys` keys.
     pub(crate) fn prepares_arcs(&self, keys: usize) -> bool {
         self.prepares_arcs_from < usize::MAX && keys >= self.prepares_arcs_from
     }
@@ -265,8 +266,8 @@ mod tests {
         assert_eq!(bytes(true), 2_113_536);
     }
 
-    /// An item of the work list asks for the filter of tiny components wherever the arc may need it, and seldom
-    /// beside that.
+    /// An item of the work list has the mark for the filter of tiny components whenever the arc may need it, and seldom
+    /// otherwise.
     #[test]
     fn tiny_components_are_expected_where_they_may_be() {
         let set = keys_of_all_kinds(200, 100);

@@ -30,7 +30,7 @@ pub struct EngineChoices {
     pub read_back: &'static str,
     /// `direct`, `small-direct` or `host`: the default of uploads to the device.
     pub uploads: &'static str,
-    /// The number of keys from which on the device prepares the arcs of a clip; `None` where the host always does.
+    /// The number of keys from which on the device prepares the arcs of a clip; `None` if the host always does.
     pub arcs_prepared_from: Option<usize>,
     /// Whether kernels write into the caller's memory, which is imported.
     pub imports_memory: bool,
@@ -98,8 +98,8 @@ impl VulkanEngine {
 /// Rates at which a device writes its memory in bytes per second: medians of several runs, by the device's clock.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct WriteRates {
-    /// The rate of the kernel that the engine uses on the device, for one constant. On cards, neighbouring
-    /// invocations store neighbouring rotations.
+    /// The rate of the kernel that the engine uses on the device, which here evaluates one constant. On cards,
+    /// neighbouring invocations store neighbouring rotations.
     pub store: f64,
     /// The rate of `vkCmdFillBuffer`.
     pub fill: f64,

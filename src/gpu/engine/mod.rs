@@ -66,14 +66,14 @@ pub(crate) struct VulkanEngine {
     pub(crate) device: Arc<LogicalDevice>,
     /// Pipelines, which are made when they are first needed.
     pipelines: Mutex<[Option<Arc<Pipeline>>; KERNELS.len()]>,
-    /// Kernels in whose place others are used, because they differ from the CPU.
+    /// Kernels that differ from the CPU; other kernels are used in their place.
     replaced: Mutex<Vec<KernelCheck>>,
     pub(crate) in_flight: Exclusive<Vec<InFlight<WorkLists>>>,
     pub(crate) keys_in_flight: Exclusive<Vec<InFlight<KeyUploads>>>,
     pub(crate) in_flight_count: usize,
     /// Whether neighbouring invocations evaluate neighbouring samples; otherwise each evaluates a run of samples.
     pub(crate) maps_samples: bool,
-    /// How many of them evaluate a run together.
+    /// The number of invocations that evaluate a run together.
     pub(crate) run_lanes: RunLanes,
     /// The number of keys from which on the arcs between them are prepared on the device.
     pub(crate) prepares_arcs_from: usize,
@@ -235,7 +235,8 @@ impl VulkanEngine {
         }
     }
 
-    /// The check of a kernel that differs from the CPU; `None` if it does not. It is not run if it is known to pass.
+    /// The check of a kernel that differs from the CPU; `None` if it does not. The check is not run if the kernel is
+    /// known to pass.
     fn difference(
         &self,
         kernel: Kernel,
@@ -254,9 +255,10 @@ impl VulkanEngine {
         Ok(None)
     }
 
-    /// Whether the engine evaluates with a kernel where others could take its place: the device runs it, and its bits are
-    /// the CPU's. A kernel that differs is refused here even if inexact devices are allowed, because the others need not
-    /// differ; it is listed as [`replaced`](KernelCheck::replaced). Other errors are left to the first use of the kernel.
+    /// Whether the engine uses a kernel that other kernels can replace: it does if the device runs it and gives the
+    /// CPU's bits. A kernel that differs is refused here even if inexact devices are allowed, because the others need
+    /// not differ; it is listed as [`replaced`](KernelCheck::replaced). Other errors are left to the first use of the
+    /// kernel.
     pub(crate) fn uses(&self, kernel: Kernel) -> bool {
         if !Pipeline::can_run(&self.device, kernel) {
             return false;

@@ -57,7 +57,7 @@ impl VulkanEngine {
         self.run(job, window, Target::External(buffer), None)
     }
 
-    /// The lists of a result that the host reads, if the same result was requested before.
+    /// The kept work lists of a result that the host reads, if the same result was requested before.
     pub(crate) fn kept(
         &self,
         job: Job<'_>,

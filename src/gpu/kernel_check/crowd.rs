@@ -189,7 +189,7 @@ impl CompactGroups {
                 let step = random.step();
                 *key = random.near(*key, step);
             }
-            // Some have another sign than they were added with.
+            // Some keys are multiplied by 4, as keys that were added with the opposite sign.
             key.map(|key| match random.once_in(3) {
                 true => key.map(|component| component * 4.0),
                 false => key,
@@ -335,7 +335,7 @@ fn walk(random: &mut Random) -> Trial {
 pub(super) const LEVELS: [&[[u32; 2]]; 3] =
     [&[[1, 0], [2, 0]], &[[6, 1]], &[[3, 2], [5, 6], [4, 6]]];
 
-/// These links, and behind them where each level begins and ends, from an index on.
+/// These links, followed by the first and the last index of each level.
 pub(super) fn links_of_levels() -> (Vec<CrowdLink>, u32) {
     let link = |[joint, parent]: [u32; 2]| CrowdLink { joint, parent };
     let mut links: Vec<_> = LEVELS.concat().into_iter().map(link).collect();

@@ -10,7 +10,8 @@ use crate::shader::{
 use super::random::Random;
 use super::{Trial, bytes, groups};
 
-/// A key as a kernel reads it: with its own sign, and a bit if the shortest path has the other one.
+/// A key as a kernel reads it: with the sign with which it was added, and a bit that says whether the shortest path
+/// needs the opposite sign.
 fn stored(authored: [f32; 4], is_negated: bool) -> [u32; 4] {
     let mut stored = authored.map(f32::to_bits);
     if is_negated {

@@ -1,4 +1,4 @@
-//! The check of kernels: before the first result of a kernel is used, its output on the device is compared, bit for
+//! The check of kernels. Before the first result of a kernel is used, its output on the device is compared, bit for
 //! bit, with the result of its entry point in Rust ([`entries`](crate::twin::entries)) for the same inputs.
 
 mod crowd;

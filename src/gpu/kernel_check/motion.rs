@@ -31,7 +31,7 @@ pub(super) fn trials(kernel: Kernel, random: &mut Random) -> Vec<Trial> {
     }
 }
 
-/// States of so many samples: unit rotations, positions and velocities.
+/// States of `samples` samples: unit rotations, positions and velocities.
 fn states(random: &mut Random, samples: u32) -> Vec<[f32; 4]> {
     let state = |random: &mut Random| {
         let [local, world] = random.pair();
@@ -89,7 +89,8 @@ fn joints(random: &mut Random, moves: u32) -> Trial {
             },
         }
     };
-    // Rotations for all forms: those of a curve have the room of polynomials.
+    // The cells contain rotations for all forms. Every channel gets as many cells as polynomials need, which need the
+    // most.
     let room = SPANS * COUNT * POWERS as u32;
     let cells: Vec<[f32; 4]> = (0..room + 4).map(|_| random.rotation()).collect();
     let channel = |random: &mut Random, kind: u32| {
@@ -116,7 +117,7 @@ fn joints(random: &mut Random, moves: u32) -> Trial {
     let channels: Vec<CrowdChannel> = (0..channels)
         .map(|index| channel(random, index % CHANNELS))
         .collect();
-    // Some at keys, some behind the end.
+    // Some samples are at keys, some after the end.
     let sample = |random: &mut Random| MotionSample {
         clip: random.below(2),
         tick: match random.once_in(3) {
@@ -182,7 +183,7 @@ fn stored(random: &mut Random) -> Trial {
     Trial::new([bytes(&states)], &dispatch, groups(count as usize, false))
 }
 
-/// Matrices of rotations in the world, or so many numbers of them.
+/// Matrices of rotations in the world, or the first `numbers` numbers of each.
 fn matrices(random: &mut Random, numbers: u32, detail: u32) -> Trial {
     let count = INSTANCES * JOINTS;
     let dispatch = MotionDispatch {

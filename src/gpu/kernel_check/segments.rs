@@ -101,8 +101,8 @@ fn of_form<S: Segment>(list: List, store: Store, random: &mut Random) -> Vec<Tri
         .collect()
 }
 
-/// A trial of the kernel over spread runs of frames in an encoding: the same samples for any lanes and workgroups, so
-/// often repeated.
+/// A trial of the kernel over spread runs of frames in an encoding, repeated `repetitions` times. The samples are the
+/// same for any number of lanes and of workgroups.
 #[cfg(feature = "lab")]
 pub(crate) fn spread_trial(
     (form, encoding): (Form, Encoding),
@@ -151,7 +151,7 @@ struct SegmentInputs<S> {
 
 impl<S: Segment> SegmentInputs<S> {
     fn new(random: &mut Random, encoding: Encoding) -> Self {
-        // All other stores only accept rotations.
+        // Some stores take any vectors. All others accept only rotations, and get no other segments here.
         let takes_any = encoding.row().takes_vectors;
         let segment = |random: &mut Random| match takes_any && random.once_in(3) {
             true => S::any(random),
@@ -196,7 +196,7 @@ impl<S: Segment> SegmentInputs<S> {
         });
     }
 
-    /// A segment, or a constant and the bit that says so.
+    /// The index of a segment, or the index of a constant with the bit that marks constants.
     fn source(random: &mut Random) -> (u32, u32) {
         match random.once_in(8) {
             true => (random.below(CONSTANTS as u32), IS_CONSTANT),
@@ -318,8 +318,9 @@ impl<S: Segment> SegmentInputs<S> {
         self.finish(listed, &grid, groups)
     }
 
-    /// Runs of consecutive samples, between some of which there are samples of no run; each run has a number of lanes.
-    /// Each repetition is of segments and constants further on. Frame by frame, repetitions are tracks.
+    /// Runs of consecutive samples; between some runs there are samples of no run. Several lanes evaluate each run.
+    /// Each repetition uses the segments and the constants after those of the repetition before it. Frame by frame,
+    /// each repetition is a track.
     fn spread(
         mut self,
         random: &mut Random,
@@ -370,7 +371,8 @@ impl<S: Segment> SegmentInputs<S> {
         self.finish(listed, &dispatch, groups)
     }
 
-    /// The run of an item, which may begin with a key; in frames far from the middle, it says so.
+    /// The run of an item, which may begin with a key. A run whose frames are far from the middle has the mark for
+    /// this.
     fn run(
         &self,
         random: &mut Random,

@@ -21,8 +21,8 @@ use super::crowd::{
 use super::random::Random;
 use super::{Trial, bytes};
 
-/// Instances of the window, and those of a workgroup: a power of two, and so many that an invocation has several joints,
-/// and several time bases.
+/// The number of instances of the window, and of a workgroup. The number for a workgroup is a power of two, and so
+/// large that an invocation has several joints and several time bases.
 const INSTANCES: u32 = 38;
 const OF_WORKGROUP: u32 = 16;
 const CLOCK: u64 = 0x00ab_cdef_0123_4567;
@@ -33,7 +33,8 @@ pub(super) fn trials(kernel: Kernel, random: &mut Random) -> Vec<Trial> {
         kernel,
         Kernel::CrowdSubgroupRotations | Kernel::CrowdSubgroupRotationsF16
     ) {
-        // Two instances with two time bases, and one of them, for subgroups with the fewest lanes.
+        // Subgroups evaluate two instances or one, each with two time bases; one is for subgroups with the fewest
+        // lanes.
         return [2, 1]
             .map(|instances| of_subgroups(random, instances))
             .into();
@@ -93,7 +94,7 @@ const SMALL: Size = Size {
     cells: CELLS,
 };
 
-/// So many joints that a lane has several, and so many spans that some are looked for in several steps.
+/// Enough joints that a lane has several, and enough spans that the search for some takes several steps.
 const LARGE: Size = Size {
     joints: 44,
     spans: 40,

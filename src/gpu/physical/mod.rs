@@ -93,7 +93,7 @@ pub(crate) fn list(validation: bool) -> Result<Vec<PhysicalDevice>, VulkanError>
     for raw in all.named("vkEnumeratePhysicalDevices")? {
         match PhysicalDevice::new(&instance, raw) {
             Ok(device) => devices.extend(device),
-            // Other devices may still work.
+            // The search continues, because other devices may work.
             Err(error) => failed = Some(error),
         }
     }
@@ -370,8 +370,9 @@ impl PhysicalDevice {
     }
 }
 
-/// The lanes of a subgroup of a compute kernel, if there are as many as kernels divide among positions, and not more
-/// than two words of a ballot have, and they vote and shuffle.
+/// The number of lanes of a subgroup of a compute kernel; `None` if kernels cannot use the subgroups. They can if there
+/// are enough lanes to divide among positions, not more lanes than a ballot of two words has bits, and if the lanes can
+/// vote and shuffle.
 fn subgroup_lanes(properties: &vk::PhysicalDeviceSubgroupProperties<'_>) -> Option<u32> {
     const LANES: std::ops::RangeInclusive<u32> = 2 * MAX_SUBGROUP_POSITIONS..=64;
     let needed = vk::SubgroupFeatureFlags::BASIC

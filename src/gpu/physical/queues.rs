@@ -30,8 +30,8 @@ const OTHER_WORK: vk::QueueFlags = vk::QueueFlags::from_raw(
         | vk::QueueFlags::OPTICAL_FLOW_NV.as_raw(),
 );
 
-/// The family of the queue that computes: the first with compute and without graphics, which a desktop keeps busy;
-/// otherwise the first with compute.
+/// The family of the queue that computes: the first with compute and without graphics, because a desktop keeps graphics
+/// queues busy; otherwise the first with compute.
 pub(crate) fn compute_family(families: &[vk::QueueFamilyProperties]) -> Option<u32> {
     use vk::QueueFlags as Flags;
     let computes = |family: &vk::QueueFamilyProperties| {
@@ -63,9 +63,9 @@ pub(crate) fn check_family(
     }
 }
 
-/// The queue that can run beside one of the family `compute` and disturbs it least: a copy engine; otherwise a family
-/// with compute and without graphics; otherwise a second queue of the same family; otherwise any other family with
-/// compute or graphics. Families for video and optical flow are not used.
+/// The queue that can run at the same time as one of the family `compute` and disturbs it least. The first of these
+/// that exists is used: a copy engine; a family with compute and without graphics; a second queue of the same family;
+/// any other family with compute or graphics. Families for video and optical flow are not used.
 pub(crate) fn copy_queue(
     families: &[vk::QueueFamilyProperties],
     compute: u32,
@@ -124,8 +124,8 @@ mod tests {
         Some(QueueIndex { family, index })
     }
 
-    /// Copy engines first, then what computes without drawing, then a second queue of the same
-    /// family; nothing where there is one queue.
+    /// The queue for copies is that of a copy engine, else that of a family that computes without graphics, else a
+    /// second queue of the same family; with a single queue there is none.
     #[test]
     fn each_card_copies_on_the_queue_that_is_least_in_the_way() {
         assert_eq!(of("H200"), queue(1, 0));
@@ -140,7 +140,7 @@ mod tests {
         assert_eq!(of("SwiftShader"), None);
     }
 
-    /// Kernels leave the queues that draw alone, where a family computes alone.
+    /// Kernels run in a family without graphics, if a card has one.
     #[test]
     fn each_card_computes_where_it_does_not_draw() {
         for (name, family) in [
@@ -187,7 +187,7 @@ mod tests {
         families[0].queue_count = 1;
         families.extend(video);
         assert_eq!(copy_queue(&families, 0), None);
-        // The family that computes need not be the first.
+        // The compute family here is 2, which is not the first one.
         let families = card("RTX 4060").families;
         assert_eq!(copy_queue(&families, 2), queue(1, 0));
     }

@@ -8,9 +8,9 @@ const BY_VENDOR: [(u32, RunLanes); 1] = [(NVIDIA, RunLanes([4, 4, 8, 8, 8]))];
 
 const NVIDIA: u32 = 0x10de;
 
-/// The numbers for a vendor's cards; NVIDIA's for vendors that were not measured. The time that a run takes before its
-/// first sample, and the lanes without a sample in its first and its last iteration, weigh less the fewer lanes it has;
-/// eight store a whole line of memory.
+/// The numbers for a vendor's cards; NVIDIA's for vendors that were not measured. Few lanes suit short runs: they lose
+/// less time before the first sample of a run, and fewer of them have no sample in its first and its last iteration.
+/// Eight lanes store a whole line of memory.
 pub(crate) fn run_lanes(vendor: u32) -> RunLanes {
     let mut rows = BY_VENDOR.iter();
     rows.find(|(known, _)| *known == vendor)
@@ -21,7 +21,7 @@ pub(crate) fn run_lanes(vendor: u32) -> RunLanes {
 mod tests {
     use super::*;
 
-    /// The class of runs follows from their mean length, and of numbers that no kernel takes the nearest one is used.
+    /// The class of runs follows from their mean length. If no kernel takes a number of lanes, the nearest one is used.
     #[test]
     fn lanes_are_those_of_the_class_of_runs() {
         let lanes = run_lanes(NVIDIA);

@@ -122,9 +122,9 @@ mod tests {
     use super::*;
     use crate::gpu::physical::cards::card;
 
-    /// Uploads go to all of it where a resizable BAR or shared memory makes the host see everything,
-    /// to a 64th of the old window, nowhere where there is none. Results stay where memory is one
-    /// and cached.
+    /// With a resizable BAR or shared memory, the host writes uploads of any size directly; without, only up to a 64th
+    /// of the window of 256 MiB; with no such memory, none. Results stay in place if the device's memory is the host's
+    /// and is cached.
     #[test]
     fn each_card_has_the_memory_that_it_is_made_for() {
         let everything = u64::MAX;

@@ -28,7 +28,7 @@ impl PassRequest<'_> {
     /// contain the ranges. The layers of a blend that are not contiguous must have the usage `TRANSFER_SRC` too.
     /// Nothing else may use the ranges until this returns.
     pub unsafe fn to_buffer(&self, buffer: VulkanBuffer) -> Result<(), Error> {
-        // SAFETY: promised by the caller; `run` waits for the work before the target goes.
+        // SAFETY: as the caller promises; `run` waits for the work before the target is dropped.
         let target = unsafe { self.target(buffer) }?;
         Ok(target.run()?)
     }

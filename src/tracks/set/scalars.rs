@@ -107,9 +107,9 @@ impl TrackSet {
         self.scalars.iter().position(|scalar| scalar.name == name)
     }
 
-    /// The indices of the first scalar of each pack, and the number of scalars at the end: up to
-    /// [`SCALARS_OF_A_PACK`] consecutive scalars that have the same key times, and all tangents or none; with
-    /// `alone`, each is a pack.
+    /// The index of the first scalar of each pack, and at the end the number of scalars. A pack has up to
+    /// [`SCALARS_OF_A_PACK`] consecutive scalars with the same key times, of which all have tangents or none has. With
+    /// `alone`, each scalar is a pack.
     pub(crate) fn scalar_packs(&self, alone: bool) -> Vec<usize> {
         let mut starts = Vec::new();
         for (i, scalar) in self.scalars.iter().enumerate() {

@@ -1,6 +1,5 @@
-//! Division of sets with fewer samples than keys into dispatches for a Vulkan device: some tracks at a time, and the
-//! input of a kernel for them: keys with their stored signs, the positions of the samples among them, and the tangent
-//! weights.
+//! Division of sets with fewer samples than keys into dispatches for a Vulkan device, each for some tracks. The input
+//! of a dispatch is: keys with their stored signs, the positions of the samples among them, and the tangent weights.
 
 use std::iter::Peekable;
 use std::ops::Range;

@@ -142,7 +142,7 @@ pub(crate) struct GroupItems {
     pub(crate) first_item: u32,
     /// The number of items, or of samples of a sample list.
     pub(crate) items: u32,
-    /// The offset of the first sample of a sample list, or what is added to the offsets of spread runs.
+    /// The offset of the first sample of a sample list, or the number that is added to the offsets of spread runs.
     pub(crate) first_output: u32,
     pub(crate) shape: WorkShape,
 }
@@ -150,7 +150,7 @@ pub(crate) struct GroupItems {
 /// Which invocation evaluates which sample of a group.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum WorkShape {
-    /// Each an item, or a listed sample.
+    /// Each invocation evaluates an item, or a listed sample.
     Alone,
     /// Neighbours evaluate neighbouring tracks.
     Grid(GroupGrid),
@@ -201,7 +201,7 @@ pub(crate) struct ListRequest<'a> {
     /// Whether neighbouring invocations evaluate neighbouring samples, if possible; otherwise each evaluates a run of
     /// samples.
     pub(crate) maps_samples: bool,
-    /// How many of them evaluate a run together.
+    /// The number of invocations that evaluate a run together.
     pub(crate) run_lanes: RunLanes,
     pub(crate) clip: &'a ClipData,
     pub(crate) timeline: &'a Timeline,
@@ -211,8 +211,8 @@ pub(crate) struct ListRequest<'a> {
 pub(crate) trait ListRoom<'r> {
     type Error: From<SampleTimesError>;
 
-    /// Room for lists of so many bytes: items or listed samples, distances, and blocks; none for those that kernels do
-    /// not bind. It may be slow to read.
+    /// Memory for lists with these numbers of bytes: items or listed samples, distances, and blocks; none for lists
+    /// that kernels do not bind. Reading from this memory may be slow.
     fn room(self, bytes: [Option<usize>; 3]) -> Result<[&'r mut [u8]; 3], Self::Error>;
 }
 
@@ -653,9 +653,9 @@ pub(crate) fn write(
         });
 }
 
-/// Whether a sample of a segment may have a component that is nearly 0, and needs the filter for
-/// those ([`Evaluate::is_canonical`](crate::twin::Evaluate::is_canonical)). Of arcs that only the device knows
-/// it may be true where none has.
+/// Whether a sample of a segment may have a component that is nearly 0, and needs the filter for those
+/// ([`Evaluate::is_canonical`](crate::twin::Evaluate::is_canonical)). For arcs that only the device computes, the
+/// answer may be true although no component is nearly 0.
 #[inline(always)]
 pub(crate) fn may_be_tiny(prepared: &Prepared, index: u32) -> bool {
     let (segments, index) = (&prepared.segments, index as usize);

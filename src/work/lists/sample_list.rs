@@ -22,9 +22,9 @@ use crate::work::lists::{GroupItems, Patch, Work, WorkShape, parts_in, parts_per
 /// Whether the runs of a window are short.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum KeyDensity {
-    /// They are where there are no more samples than spans, or few explicit times.
+    /// Not listed before: they count as short if there are no more samples than spans, or few explicit times.
     Unknown,
-    /// They were listed, and are.
+    /// The runs were listed before, and are short.
     ShortRuns,
 }
 

@@ -25,7 +25,7 @@ use crate::work::lists::{
     parts_in, spread_list,
 };
 
-/// The tracks from which on a list is repeated rather than written for each.
+/// The number of tracks from which on a list is repeated instead of being written for each track.
 const LEAST_TRACKS: u32 = 64;
 
 /// The same frame by frame: as many as store a line of rotations together.
@@ -74,7 +74,7 @@ impl TrackStride {
         stride
     }
 
-    /// Whether a part has the spans of the first one, so many tracks further on.
+    /// Whether a part has the spans of the first part, with indices for `tracks` tracks further on.
     fn fits(self, prepared: &Prepared, first: &TrackPart, part: &TrackPart, tracks: u32) -> bool {
         let spans = &prepared.spans;
         let constants = self.constants.wrapping_mul(tracks);
@@ -156,7 +156,7 @@ impl SharedGroup {
             let sample = window.samples.start + run.output as usize;
             run.output = window.offset(track, sample) as u32;
         }
-        // A component of any track may be tiny.
+        // A run has the mark for tiny components if any of the tracks needs it, because all tracks share the run.
         first.runs.par_iter_mut().for_each(|run| {
             let segment = |track: u32| run.source.wrapping_add(stride.segments.wrapping_mul(track));
             if run.count & (IS_CONSTANT | NEEDS_CARE) == 0
@@ -218,7 +218,7 @@ impl SharedGroup {
         }
     }
 
-    /// Its lists: of some tracks, repeated, and of what is left of its tracks. `None` as in
+    /// The lists of a group: one of some tracks, which is repeated, and one of the remaining tracks. `None` as in
     /// [`SharedGroup::tracks_of_list`].
     fn lists_of_tracks(&self, lanes: SpreadLanes) -> Option<Vec<SharedList>> {
         let tracks = self.tracks_of_list(lanes)?;
@@ -417,7 +417,8 @@ mod tests {
     /// The source of a sample: a constant; or a segment, the distance from its middle, scale and offset.
     type Source = (bool, u32, i32, [u32; 2]);
 
-    /// The source of every sample, and whether it needs care. The samples of a track are so far from each other.
+    /// The source of every sample, and whether it needs care. Neighbouring samples of a track are `stride` values
+    /// apart.
     fn sources(
         runs: impl Iterator<Item = SpreadRun>,
         samples: usize,

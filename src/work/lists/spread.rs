@@ -83,12 +83,13 @@ impl RunCounts {
 pub(crate) enum LaneAxis {
     /// Samples of a track: each lane evaluates some samples of a run.
     Samples,
-    /// Tracks with the same runs, frame by frame: each lane evaluates a whole run of its track. Its samples are so far
-    /// from each other in the result.
+    /// Tracks with the same runs, frame by frame: each lane evaluates a whole run of its track. Neighbouring samples of
+    /// a track are `stride` values from each other in the result.
     Tracks { stride: u32 },
 }
 
-/// How often the entries of a list are evaluated, and how much further on each time.
+/// How often the entries of a list are evaluated, and by how much the indices of segments, constants and results grow
+/// each time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct RunRepetitions {
     pub(crate) count: u32,
@@ -128,7 +129,8 @@ impl SpreadLanes {
         }
     }
 
-    /// Lanes with neighbouring tracks, whose samples are so far from each other.
+    /// Lanes with neighbouring tracks. Neighbouring samples of a track are `stride` values from each other in the
+    /// result.
     #[cfg(feature = "lab")]
     pub(crate) fn with_tracks(log2: u32, stride: u32) -> Self {
         Self {
@@ -149,8 +151,8 @@ impl SpreadLanes {
         Self::new(run_lanes.of_class(class).ilog2())
     }
 
-    /// Lanes with neighbouring tracks, of which there are so many with so many samples each: the most of which at most an
-    /// eighth has no track, from a line of rotations up to a workgroup.
+    /// The lanes for runs of neighbouring tracks: at least as many as a cache line has rotations, at most a workgroup.
+    /// Of these sizes, it is the largest at which at most an eighth of the lanes has no track.
     pub(crate) fn of_tracks(tracks: u32, samples: u32, stride: u32) -> Self {
         let is_used = |log2: &u32| {
             let lanes = tracks.next_multiple_of(1 << log2);
@@ -338,7 +340,7 @@ impl SpreadLanes {
         }
     }
 
-    /// The workgroups of a dispatch over entries that are repeated so often.
+    /// The workgroups of a dispatch over entries with this number of repetitions.
     pub(crate) fn workgroups(self, entries: u32, repetitions: u32) -> [u32; 3] {
         let of_layer = (entries << self.log2).div_ceil(self.workgroup);
         [of_layer, 1, repetitions.div_ceil(self.layer_repetitions())]

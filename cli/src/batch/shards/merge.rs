@@ -55,8 +55,8 @@ pub(crate) struct ShardProgress {
     first_missing: Option<usize>,
 }
 
-/// A line of the new manifest: its result, and where it is. File 0 is the previous manifest, any
-/// other the file of the shard of this number.
+/// A line of the new manifest: its result, and the file and position of the line. File 0 is the previous manifest; file
+/// n is the file of shard n.
 struct LinePosition {
     output: String,
     file: usize,

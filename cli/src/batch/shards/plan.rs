@@ -109,7 +109,7 @@ pub(crate) struct ShardOptions {
 }
 
 impl ShardPlan {
-    /// Cuts inputs, of those sizes, into shards.
+    /// Divides inputs with these sizes into shards.
     pub(crate) fn new(
         inputs: GatheredInputs,
         sizes: &[u64],
@@ -268,7 +268,7 @@ impl RecordedPlan {
         folder.join(Self::name())
     }
 
-    /// Reads the record of a directory; `None` where it has no shards.
+    /// Reads the record of a directory; `None` if it has no shards.
     pub(crate) fn read(folder: &Path) -> Result<Option<Self>, Failure> {
         let path = Self::path(folder);
         let refuse = |why: &dyn std::fmt::Display| {
@@ -307,8 +307,8 @@ impl RecordedPlan {
         }
     }
 
-    /// The message about a directory whose shards have lost the record of their plan. Where a manifest lists the
-    /// results, files of shards are what an interrupted merge left.
+    /// The message about a directory that has files of shards but no record of their plan. If a manifest lists the
+    /// results, an interrupted merge has left these files.
     pub(crate) fn lost(folder: &Path) -> Option<String> {
         let path = Self::path(folder);
         let is_there = |path: &Path| std::fs::symlink_metadata(path).is_ok();
@@ -350,8 +350,8 @@ impl RecordedPlan {
         output.commit().map_err(|error| Failure::output(&error))
     }
 
-    /// Removes the record and the files of merged shards. The record goes first: without it what an
-    /// interruption leaves is ignored. Files that no shard has written stay.
+    /// Removes the record and the files of merged shards. The record is removed first, because without it the files
+    /// that an interruption leaves are ignored. Files that no shard has written are kept.
     pub(crate) fn remove(opened: &Folder) -> Result<(), Failure> {
         let folder = opened.path();
         let failed = |error: io::Error| {

@@ -41,10 +41,10 @@ pub(crate) struct ShardHeader {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct RefusedInput {
     pub(crate) input: String,
-    /// The exit code of a command that has this input alone.
+    /// The exit code of a command that has only this input.
     pub(crate) code: u8,
     pub(crate) message: String,
-    /// The result that it would have, where it can have one.
+    /// The result that it would have, if one is possible.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) result: Option<String>,
     /// As in [`InputEntry`].
@@ -131,7 +131,7 @@ pub(crate) fn text<'a>(
     first + &lines.concat()
 }
 
-/// The header of a shard's file, and its length; `None` where the file is not a shard's.
+/// The header of a shard's file, and its length; `None` if the file is not a shard's.
 pub(crate) fn header(bytes: &[u8]) -> Option<(ShardHeader, usize)> {
     let end = bytes.iter().position(|&byte| byte == b'\n')? + 1;
     let header = serde_json::from_slice(&bytes[..end]).ok()?;
@@ -179,7 +179,7 @@ struct NamedResult {
     one_of: Option<(String, usize)>,
 }
 
-/// The result that a line names, and that of all clips; `None` where the line is not an entry, or names
+/// The result that a line names, and that of all clips; `None` if the line is not an entry, or names
 /// a result outside its directory.
 pub(crate) fn owner(line: &[u8]) -> Option<(String, Option<String>)> {
     let NamedResult { output, one_of } = serde_json::from_slice(line).ok()?;
@@ -212,7 +212,7 @@ pub(crate) fn inputs_of(folder: &Path, results: &HashSet<&str>) -> HashMap<Strin
     inputs
 }
 
-/// The results, of those in `found`, that a directory's manifests have from inputs of other paths, in order.
+/// The results in `found` that, according to a directory's manifests, were made from inputs with other paths; in order.
 pub(crate) fn other_owners(
     folder: &Path,
     found: &HashMap<&str, &FoundInput>,
@@ -235,8 +235,8 @@ pub(crate) fn other_owners(
     owners
 }
 
-/// The first result, of those in `found`, that a directory's manifests have from another command than that of shards,
-/// and this command.
+/// The first result in `found` that, according to a directory's manifests, another command has made than the command of
+/// shards; and that command.
 pub(crate) fn of_other_command(
     folder: &Path,
     found: &HashMap<&str, &FoundInput>,
@@ -267,7 +267,7 @@ fn for_each_line(folder: &Path, mut each: impl FnMut(&[u8])) {
     }
 }
 
-/// The inputs without results in a directory's manifest, by the names of their results; `None` where there is no
+/// The inputs without results in a directory's manifest, by the names of their results; `None` if there is no
 /// manifest.
 pub(crate) fn merged_failures(folder: &Path) -> Option<HashMap<String, InputEntry>> {
     let file = entry::open(folder).ok().flatten()?;

@@ -19,8 +19,8 @@ use crate::messages::words;
 /// The most files that wait to be renamed: a process may have about a thousand open.
 const MAX_WAITING: usize = 128;
 
-/// How many files are synced at once. One by one they cost up to 7 ms each; a file system writes its
-/// journal once for all that wait.
+/// The number of files that are synced at the same time. One after another they take up to 7 ms each; a file system
+/// writes its journal once for all files that wait.
 const SYNCED_AT_ONCE: usize = 16;
 
 /// A shard that is being evaluated.

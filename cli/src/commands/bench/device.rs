@@ -23,7 +23,7 @@ pub(crate) struct DeviceReport {
     driver_version: Option<u32>,
     uuid: String,
     choices: Option<EngineChoices>,
-    /// Bytes a second into the device's own memory; `None` where it has no clock.
+    /// Bytes a second into the device's own memory; `None` if it has no clock.
     write_rates: Option<WriteRates>,
 }
 
@@ -50,14 +50,14 @@ impl BenchDevice {
         Ok(Self { engine, report })
     }
 
-    /// Whether results come back through memory that is fresh each time, unless the caller brings memory that
-    /// is used again.
+    /// Whether the device copies results to the host. If the caller does not pass memory that is used again, this is
+    /// new memory each time.
     pub(crate) fn copies_results(&self) -> bool {
         let info = self.engine.device_info();
         info.is_some_and(|info| !matches!(info.kind, DeviceKind::Integrated | DeviceKind::Cpu))
     }
 
-    /// Bytes a second that nothing exceeds for long; 0 where that is unknown.
+    /// The highest sustained speed in bytes per second; 0 if it is unknown.
     pub(crate) fn write_limit(&self) -> f64 {
         self.report.write_rates.map_or(0.0, |rates| rates.limit())
     }

@@ -1,5 +1,4 @@
-//! Motion files: how fast clips are read, beside reading their bytes alone, and whether sampling
-//! them takes much longer than reading them.
+//! Motion files: the time to read clips, compared with the time to read only their bytes, and the time to sample them.
 
 use std::hint::black_box;
 use std::path::{Path, PathBuf};
@@ -45,7 +44,7 @@ pub(crate) fn measure(shrink: usize, repetitions: Repetitions) -> Result<Vec<Sec
     sections.filter_map(Result::transpose).collect()
 }
 
-/// Writes the clips: each begins a frame later in the walk than the one before. Nothing where the
+/// Writes the clips: each begins a frame later in the walk than the one before. Nothing if the
 /// format holds one joint.
 fn library(
     format: &Format,

@@ -1,5 +1,5 @@
-//! Bodies on paths, prepared and evaluated in bulk, beside double reflection (Wang et al. 2008) from
-//! frame to frame as it is usually written.
+//! Bodies on paths, prepared and evaluated in bulk, compared with the usual way: double reflection (Wang et al. 2008)
+//! from frame to frame.
 
 use glam::{Mat3, Quat, Vec3};
 use rayon::prelude::*;

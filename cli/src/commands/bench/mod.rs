@@ -1,6 +1,6 @@
-//! `tumble bench`: how fast this machine is, against itself and against what a user
-//! would write. Everything is measured in one run, in turns, because machines are
-//! shared and their clocks drift; what counts are the ratios.
+//! `tumble bench`: the speed on this machine, compared with its speed of writing memory and with code that a user would
+//! write. All contestants are measured alternately in one run, because machines are shared and their clock rates
+//! change. Only the ratios are meaningful.
 
 pub(crate) mod characters;
 pub(crate) mod device;
@@ -228,7 +228,8 @@ fn measure(
     Ok(Section::new(kind, method, count, rows))
 }
 
-/// Keys and results stay on the device, whose clock counts; `None` where it has none.
+/// A contestant whose keys and results stay on the device. The device's clock measures the time; `None` if it has no
+/// clock.
 fn resident<'a>(
     device: &BenchDevice,
     clip: &'a Clip,
@@ -248,7 +249,8 @@ fn resident<'a>(
     Ok(Some(contestant))
 }
 
-/// Into reused memory of the caller, for a device that copies its results.
+/// A contestant that evaluates into memory of the caller, which is used again each time, for a device that copies its
+/// results.
 fn into_host_memory<'a>(
     clip: &'a Clip,
     workload: &'a Workload,
@@ -259,7 +261,8 @@ fn into_host_memory<'a>(
     }
 }
 
-/// Into memory that the device chooses, which is the fastest for a caller if it is also the host's.
+/// A contestant that evaluates into memory that the device chooses. This is the fastest for a caller if it is also the
+/// host's memory.
 fn on_device<'a>(
     clip: &'a Clip,
     workload: &'a Workload,

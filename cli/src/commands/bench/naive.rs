@@ -1,5 +1,5 @@
-//! The loop that a user would write today: glam, f32, a cursor for each track, rayon over
-//! tracks. The measure that ratios are taken against.
+//! The loop that a user would write today: glam, f32, a cursor for each track, rayon over tracks. Reported ratios are
+//! relative to its time.
 
 use glam::{Quat, Vec3};
 use rayon::prelude::*;
@@ -113,7 +113,7 @@ impl<'a> Cursor<'a> {
         Self { track, interval: 0 }
     }
 
-    /// Moves to the interval of `time`; where in it that is, from 0 to 1.
+    /// Moves to the interval of `time`; returns the position in the interval, from 0 to 1.
     fn advance(&mut self, time: f64) -> f32 {
         let times = self.track.times;
         while self.interval + 2 < times.len() && times[self.interval + 1] <= time {

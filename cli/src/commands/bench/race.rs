@@ -25,8 +25,8 @@ pub(super) struct TimeShare {
 pub(super) struct Contestant<'a, E> {
     name: String,
     action: Action<'a, E>,
-    /// Whether the first part is the time that counts, and not the host's from call to return: where a result
-    /// stays on a device. Then the bytes that the device writes, and the bytes a second that it can write.
+    /// For a result that stays on a device: the bytes that the device writes, and the bytes a second that it can write.
+    /// The time of the first part then counts, instead of the host's time from call to return.
     pub(super) on_device: Option<(u64, f64)>,
 }
 

@@ -104,7 +104,7 @@ impl BenchReport {
 }
 
 impl Section {
-    /// `rows`: the write rate first, then the naive peer where there is one.
+    /// `rows`: the write rate first, then the naive peer if there is one.
     pub(crate) fn new(
         workload: WorkloadKind,
         method: Method,

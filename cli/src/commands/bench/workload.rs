@@ -9,8 +9,7 @@ use tumble::{SampleTimes, TrackSet};
 pub(crate) struct Workload {
     pub(crate) set: TrackSet,
     pub(crate) frames: SampleTimes,
-    /// The time of each sample, seconds; of each track's only sample where
-    /// `per_track`.
+    /// The time of each sample in seconds; with `per_track`, the time of the only sample of each track.
     pub(crate) times: Vec<f64>,
     pub(crate) per_track: bool,
 }

@@ -19,7 +19,7 @@ use crate::commands::compare::{Arguments, ComparisonReport, FaultKind};
 use crate::messages::exit::{ALL_INPUTS, DIFFERENCE, Failure, Outcomes};
 use crate::messages::{listing, names, words};
 
-/// The two directories that a command line names; `None` where it names anything else.
+/// The two directories that a command line names; `None` if it names anything else.
 pub(super) fn named(inputs: &Inputs) -> Option<[&Path; 2]> {
     match inputs.named_paths() {
         [first, second] if first.is_dir() && second.is_dir() && !inputs.has_list() => {

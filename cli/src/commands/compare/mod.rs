@@ -136,7 +136,7 @@ fn step(text: &str) -> Result<Step, String> {
     text.parse::<Step>().map_err(|error| error.to_string())
 }
 
-/// A motion that cannot be compared is the input's fault.
+/// The failure of a command whose inputs cannot be compared; it counts as an error of the inputs.
 fn refused(error: CompareError) -> Failure {
     let message = error.to_string();
     match error {
@@ -171,9 +171,10 @@ fn partners(paths: [&Path; 2], clips: [&[Motion]; 2]) -> Result<Vec<usize>, Fail
     (0..all[0].len()).map(found_or_refused).collect()
 }
 
-/// The index, among the animations of another file, of the one that belongs to animation `index` of a file, by the
-/// names of all: the one of the same name, if it is unique on both sides; that of the same index if each file has one,
-/// or if the names are equal in the same order.
+/// The index of the animation of a second file that belongs to animation `index` of the first. `all` has the names of
+/// the animations of both files. If each file has one animation, or both have the same names in the same order, the
+/// index is the same. Otherwise it is that of the animation of the same name, if the name occurs only once in each
+/// file.
 pub(crate) fn partner(all: [&[Option<&str>]; 2], index: usize) -> Option<usize> {
     if all.iter().all(|names| names.len() == 1) || all[0] == all[1] {
         return Some(index);
@@ -290,7 +291,7 @@ impl Arguments {
         })
     }
 
-    /// Refuses options for the joints of motions where none are compared.
+    /// Refuses options for the joints of motions if no joints are compared.
     fn check_table(&self, paths: [&Path; 2]) -> Result<(), Failure> {
         let compared = match self.is_of_trajectories() {
             true => "trajectories",
@@ -428,7 +429,7 @@ impl Arguments {
         )))
     }
 
-    /// Refuses options for joints, and bounds of other quantities, where only scalars are compared.
+    /// Refuses options for joints and bounds of other quantities if only scalars are compared.
     fn check_effects(&self, report: &ComparisonReport) -> Result<(), Failure> {
         let ComparisonReport::Clips(all) = report else {
             return Ok(());
@@ -501,7 +502,8 @@ impl Arguments {
         Ok(true)
     }
 
-    /// Every clip of one file with its like of the other; and the failure of those that were refused.
+    /// The differences of each clip of one file from its partner in the other file; and the failure of the clips that
+    /// were refused.
     fn clips(
         &self,
         paths: [&Path; 2],
@@ -588,7 +590,7 @@ impl Arguments {
         Ok(selected)
     }
 
-    /// The differences of two clips at the frames that are asked for.
+    /// The differences of two clips at the requested frames.
     fn differences(&self, engine: &Engine, pair: ClipPair<'_>) -> Result<ClipDifference, Failure> {
         let common = pair.common_times().map_err(refused)?;
         for warning in common.warning.iter().chain(&pair.assumptions()) {
@@ -608,7 +610,7 @@ impl Arguments {
         found.map_err(refused)
     }
 
-    /// Fails where a difference is over its bound.
+    /// Returns an error if a difference is over its bound.
     fn judge(&self, report: &ComparisonReport) -> Result<(), Failure> {
         let faults = self.faults(report);
         let texts: Vec<String> = faults.into_iter().map(|(_, text)| text).collect();

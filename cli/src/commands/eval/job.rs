@@ -40,14 +40,14 @@ use crate::messages::drawn::check_has_tracks;
 use crate::messages::exit::{ALL_INPUTS, Failure};
 use crate::messages::words;
 
-/// How a clip's rotations come to where they are written.
+/// Whether the rotations of a clip are evaluated at once into memory, or in chunks that are written one after another.
 #[derive(Debug, Clone, Copy)]
 enum Delivery {
     InMemory,
     InChunks,
 }
 
-/// The report of one result with `--json`.
+/// The report of one result for `--json`.
 #[derive(Debug, Clone, Serialize)]
 pub(crate) struct EvaluationReport {
     format: &'static str,
@@ -81,7 +81,7 @@ impl EvaluationReport {
     }
 }
 
-/// Evaluates all that a pipeline has; gives the number of rotations in the results that are kept.
+/// Evaluates all inputs of a pipeline; returns the number of rotations in the results that are kept.
 pub(super) fn evaluate_all(
     arguments: &Arguments,
     samples: &SampleChoice,
@@ -115,7 +115,8 @@ struct EvaluationJob<'a> {
     work: &'a ClipWork,
     /// Times in gaps of the clips that are being evaluated.
     in_gaps: usize,
-    /// The seconds after the last frame that are left out, of one of these clips, unless this was asked for.
+    /// The seconds after the last frame of one of these clips that are left out; `None` if the command line asks for
+    /// this.
     left_out: Option<f64>,
 }
 
@@ -184,13 +185,13 @@ impl EvaluationJob<'_> {
             self.warn_of_lost_channels(clips);
             return self.poses(name, clip, poses, end_frame, target);
         }
-        // Selected before the warning, so that an unknown track is the only message.
+        // Tracks are selected before the warning is printed, so that an unknown track is the only message.
         let selected = tracks.select(clip, name)?;
         self.warn_of_lost_channels(clips);
         self.rotations(name, &selected, end_frame, target)
     }
 
-    /// Warns where the evaluated curves are less smooth than their method promises.
+    /// Warns if the evaluated curves are less smooth than their method promises.
     fn note_curves(&self, name: &str, clip: &Motion) -> Result<(), Failure> {
         let curve = self.curve();
         let Some(method) = curve.method.0 else {
@@ -476,7 +477,7 @@ impl EvaluationJob<'_> {
         self.written(name, clips, &times, target, None)
     }
 
-    /// A clip whose keys have the root motion that is asked for.
+    /// The clip after its keys were changed to the requested root motion.
     fn treated_keys<'b>(
         &mut self,
         name: &str,
@@ -768,7 +769,7 @@ impl EvaluationJob<'_> {
         Ok(self.evaluated(extent, written, order))
     }
 
-    /// The scalars of a clip, `[frame][scalar]`, or how fast they change.
+    /// The scalars of a clip, `[frame][scalar]`, or their velocities.
     fn scalars(
         &mut self,
         name: &str,

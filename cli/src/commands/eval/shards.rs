@@ -36,7 +36,7 @@ pub(crate) fn run(arguments: &Arguments, part: ShardSelection) -> Result<(), Fai
     outcome
 }
 
-/// As [`run`]; adds the records of results and failures, where they are asked for.
+/// As [`run`]; adds the records of results and failures, if they are requested.
 fn run_shards(
     arguments: &Arguments,
     part: ShardSelection,
@@ -117,8 +117,8 @@ fn run_shards(
     FailedInputs::of_codes(codes.into_iter()).outcome_of(inputs)
 }
 
-/// The inputs that failed, if shards were merged and there is nothing to make for these: all other inputs have their
-/// results. A task that is queued again then changes nothing.
+/// If the shards were merged and all inputs have their results except those that failed: the inputs that failed. A task
+/// that a scheduler runs again then changes nothing.
 fn merged_part(
     evaluator: &Evaluator,
     arguments: &Arguments,
@@ -155,7 +155,7 @@ fn merged_part(
     shards.into_iter().all(is_settled).then_some(failed)
 }
 
-/// The size of a file; 0 where it cannot be read, which is reported when it is opened.
+/// The size of a file; 0 if it cannot be read, which is reported when it is opened.
 pub(crate) fn size(found: &FoundInput) -> u64 {
     std::fs::metadata(&found.path).map_or(0, |file| file.len())
 }
@@ -220,7 +220,7 @@ impl Evaluator {
     }
 
     /// Evaluates the inputs of a shard; gives the number of rotations. Inputs that are refused are in the shard's header,
-    /// and no failure. Adds the records of results and failures, where they are asked for.
+    /// and no failure. Adds the records of results and failures, if they are requested.
     pub(crate) fn evaluate(
         &mut self,
         arguments: &Arguments,

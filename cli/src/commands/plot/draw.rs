@@ -392,8 +392,8 @@ impl Brush {
     }
 }
 
-/// A tick's label: no more digits than it has; of powers of ten, whole ones only. Where all values are small, they
-/// have an exponent.
+/// The label of a tick, without unnecessary digits. On an axis of powers of ten only whole powers have labels. If all
+/// values are small, labels have an exponent.
 fn label(axis: &PlotAxis, value: f64) -> String {
     if axis.powers {
         let whole = (value - value.round()).abs() < 1e-6;
@@ -419,10 +419,10 @@ fn label(axis: &PlotAxis, value: f64) -> String {
     trimmed(&format!("{value:.decimals$}"))
 }
 
-/// Pixels between dots of which less leaves nothing of the curve to be seen.
+/// If dots are nearer to each other than this, in pixels, they would cover the whole curve.
 const CLOSE_DOTS: f64 = 10.0;
 
-/// Axes whose values are all below it have labels with exponents.
+/// An axis whose values are all smaller has labels with exponents.
 const SMALL: f64 = 0.005;
 
 #[cfg(test)]

@@ -50,9 +50,9 @@ pub(crate) struct Panel {
     pub(crate) axes: PanelAxes,
     pub(crate) curves: Vec<PlotCurve>,
     pub(crate) dots: Vec<Dots>,
-    /// Where upright lines stand: keys.
+    /// The positions of the upright lines: the times of keys.
     pub(crate) uprights: Vec<f64>,
-    /// Where a dashed level line lies: a bound.
+    /// The height of a dashed level line: a bound.
     pub(crate) level: Option<f64>,
 }
 
@@ -142,8 +142,8 @@ pub(crate) struct TimeAxis {
 }
 
 impl TimeAxis {
-    /// Times with more digits than this before the point, such as those since 1970, are drawn from a whole second on:
-    /// their labels would lie on each other.
+    /// Larger times, such as those since 1970, are drawn relative to a whole second, because their labels would
+    /// overlap.
     const LONGEST: f64 = 1e5;
 
     /// The axis of the times from the first to the last, which count from the second `offset`, with a little room.
@@ -225,7 +225,7 @@ mod tests {
         assert_eq!(range_of([0.0, 0.0, -0.0]), -1.0..1.0);
     }
 
-    /// Would catch times that fill a part of the axis only, and labels of ten digits.
+    /// Catches times that fill only a part of the axis, and labels of ten digits.
     #[test]
     fn times_fill_their_axis_whatever_they_count_from() {
         for (first, last, offset, label, origin, range) in [

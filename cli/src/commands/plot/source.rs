@@ -209,7 +209,7 @@ impl<'a> PlotSource<'a> {
         x.zip(values).collect()
     }
 
-    /// Keys among the samples: where they lie, with the sign of the curve there.
+    /// The keys within the samples: their times, and their values with the sign of the curve there.
     pub(crate) fn keys(&self, index: usize, rotations: &[Quat]) -> Vec<(f64, Quat)> {
         let track = self.set.track(index);
         let times: Vec<f64> = self.timeline.times(0).collect();

@@ -19,7 +19,7 @@ pub(crate) struct ProofComparison {
     /// Whether both evaluated by the same kernels, and compared with the same recorded results.
     pub(crate) same_kernels: bool,
     pub(crate) same_golden_table: bool,
-    /// Rounds of random sets that both evaluated from the same seed; `None` where seeds differ.
+    /// Rounds of random sets that both evaluated from the same seed; `None` if seeds differ.
     pub(crate) rounds_in_common: Option<u64>,
     /// Whether the CPUs of both computed the same bits for these rounds.
     pub(crate) same_random_bits: Option<bool>,

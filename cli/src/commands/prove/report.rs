@@ -98,11 +98,12 @@ pub(crate) struct Host {
 pub(crate) struct DeviceSection {
     #[serde(flatten)]
     pub(crate) info: DeviceInfo,
-    /// Nothing where it could not be opened.
+    /// `None` if the device could not be opened.
     pub(crate) details: Option<DeviceDetails>,
     pub(crate) choices: Option<EngineChoices>,
     pub(crate) bus: Option<Bus>,
-    /// Milliseconds that opening it took, with its self-test: the first time in this process, and the second.
+    /// The time to open the device with its self-test, in milliseconds: for the first time in this process, and for the
+    /// second.
     pub(crate) opened_in: [f64; 2],
 }
 
@@ -141,8 +142,8 @@ pub(crate) struct DifferingValues {
     pub(crate) differing: u64,
 }
 
-/// The same expressions without the pass that keeps drivers from rounding as they like: a comparison that
-/// cannot fail proves nothing.
+/// The same expressions without the exactness pass, so that the driver may change their rounding. A difference here
+/// shows that the comparison can fail; otherwise the comparison would prove nothing.
 #[derive(Debug, Default, Serialize)]
 pub(crate) struct NegativeControl {
     pub(crate) has_run: bool,

@@ -32,10 +32,10 @@ pub(crate) struct ProofOptions {
     pub(crate) run_lanes: Option<RunLanes>,
 }
 
-/// A random round of so many seconds is reported.
+/// A random round that takes at least this many seconds is reported.
 const LONG_ROUND_SECONDS: u64 = 5;
 
-/// Shares of the time that is allowed, by the end of which a step starts nothing more.
+/// For each step, the share of the time limit after which the step starts no more work.
 const COMPILED_BY: f64 = 0.2;
 const MEASURED_BY: f64 = 0.45;
 const VALIDATED_BY: f64 = 0.65;
@@ -83,8 +83,8 @@ impl DeviceSetting {
         }
     }
 
-    /// Every way to read with every way to move results and both budgets. The first four have each of
-    /// them at least once.
+    /// All combinations of how kernels read, how results are moved, and the two memory budgets. Each of these is in at
+    /// least one of the first four settings.
     fn all(run_lanes: Option<RunLanes>) -> Vec<Self> {
         let reading = [
             (Reads::StorageBuffers, Mapping::Samples, "samples"),
@@ -139,7 +139,8 @@ impl DeviceSetting {
     }
 }
 
-/// How many of [`DeviceSetting::all`] share out the recorded results in the first round.
+/// The number of settings of [`DeviceSetting::all`] among which the recorded results are distributed in the first
+/// round.
 const FIRST_SETTINGS: usize = 4;
 
 /// A run in progress.
@@ -263,7 +264,7 @@ impl ProofRun<'_> {
         }
     }
 
-    /// Runs a step where that share of the time is not over.
+    /// Runs a step if less than this share of the time limit has passed.
     fn step_if_time(
         &mut self,
         name: &str,
@@ -425,7 +426,7 @@ impl ProofRun<'_> {
         Ok(())
     }
 
-    /// Each recorded result once, shared out among the first settings.
+    /// Compares each recorded result once; the results are distributed among the first settings.
     fn recorded_once(&mut self) -> Result<(), StepError> {
         let cases = self.golden.case_count();
         self.proof.golden.cases = Golden::recorded_count().max(cases);

@@ -98,7 +98,7 @@ fn curve() -> impl TypedValueParser<Value = ReducedCurve> {
 /// The report of one clip.
 #[derive(Debug, Clone, Serialize)]
 struct ReductionReport {
-    /// The input, and its animation where it has several.
+    /// The input, and its animation if it has several.
     input: String,
     keys_before: usize,
     keys_after: usize,
@@ -335,13 +335,13 @@ impl Arguments {
                 ..ends.of(&reduced.clip, None, &[])
             }];
             let mut bytes = Vec::new();
-            // The writer itself warns of data that it cannot store.
+            // Warnings are ignored here, because only the number of bytes is needed; the final file has the warnings.
             let written = format.map(|format| format.write_clips(&sampled, &options, &mut bytes));
             Ok(written
                 .and_then(Result::ok)
                 .map_or(usize::MAX, |_| bytes.len()))
         };
-        // One file has one quantization.
+        // All clips of a file get the same quantization.
         let mut each = reduced.iter().map(|(_, all)| all.as_ref().map(|all| all.1));
         let first = each.next().flatten();
         let same = first.filter(|&first| each.all(|bits| bits == Some(first)));

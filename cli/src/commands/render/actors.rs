@@ -29,7 +29,7 @@ const REACHES: usize = 200;
 
 /// A clip, as its skeleton, its mesh, or a chain of boxes.
 pub(super) struct Subject {
-    /// With the joints of a chain where it has no positions.
+    /// The clip; if it has no positions, with the joints of a chain.
     clip: Motion,
     is_chain: bool,
     mesh: Option<Arc<CarriedMesh>>,
@@ -191,8 +191,7 @@ fn caption(method: MethodChoice) -> String {
     }
 }
 
-/// The bodies of a source, an actor for each maker, with their curves in the colour of ink, and what
-/// is around them.
+/// The bodies of a source, with an actor for each maker; their curves have the colour of ink. The scenery is added.
 pub(super) fn travellers(
     device: &mut OpenedDevice,
     name: &str,

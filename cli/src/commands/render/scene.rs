@@ -107,7 +107,7 @@ pub(crate) struct Surroundings {
     pub(crate) length: f32,
     /// How far bodies extend beyond the positions in `reach`.
     pub(crate) margin: f32,
-    /// Whether bodies throw shadows on the floor.
+    /// Whether bodies cast shadows on the floor.
     pub(crate) shadows: bool,
 }
 
@@ -128,7 +128,7 @@ pub(crate) struct Scene {
     camera: Camera,
     /// The height of the floor that shadows fall on.
     shadowed: Option<f32>,
-    /// Ground and floor, and everything that never moves; every frame begins with them.
+    /// The picture of the ground, the floor and everything that never moves, with which every frame begins.
     colour: Buffer2d<Colour>,
     depth: Buffer2d<f32>,
     labels: overlay::Labels,
@@ -336,8 +336,8 @@ impl Scene {
 }
 
 impl Camera {
-    /// Adds a triangle as it is seen, moved aside and so much nearer to the eye; nothing if it shows its
-    /// back or nothing of itself.
+    /// Adds a triangle as the camera sees it, after moving it by `shift` and by `nearer` towards the eye. Adds nothing
+    /// if its back is turned to the camera or if it is not visible.
     fn add(&self, corners: &mut Vec<(Vec4, Colour)>, face: &Face, shift: Vec3, nearer: f32) {
         let seen = face.corners.map(|corner| {
             let corner = corner + shift;

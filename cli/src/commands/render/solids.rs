@@ -13,7 +13,7 @@ pub(crate) const SUN: Vec3 = Vec3::new(0.371_390_68, 0.742_781_35, 0.557_086);
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Face {
     pub(crate) corners: [Vec3; 3],
-    /// The normal for lighting; `None` where the colour is used unchanged.
+    /// The normal for lighting; `None` if the colour is used unchanged.
     pub(crate) normal: Option<Vec3>,
     pub(crate) colour: Colour,
     /// Whether it is seen from behind too.
@@ -151,7 +151,7 @@ fn bar(from: Vec3, to: Vec3, radius: f32, colour: Colour) -> impl Iterator<Item 
     let aside = along.any_orthonormal_vector() * radius;
     let over = along.cross(aside);
     let round = [aside, over, -aside, -over];
-    // Slightly longer, so that a row of bars has no gaps at its bends.
+    // The bar is made slightly longer, so that a row of bars has no gaps at its bends.
     let (from, to) = (from - along * radius * 0.4, to + along * radius * 0.4);
     (0..4).flat_map(move |i| {
         let (one, next) = (round[i], round[(i + 1) % 4]);

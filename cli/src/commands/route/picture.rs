@@ -143,7 +143,7 @@ fn svg(up: DVec3, mesh: &Mesh, avoided: Option<&Mesh>, outcomes: &[RouteOutcome]
     svg
 }
 
-/// Every edge once; of large meshes every so many.
+/// Every edge once; of large meshes, only every n-th edge.
 fn edges(view: &TopView, mesh: &Mesh) -> String {
     let mut known = HashSet::new();
     let mut path = String::new();

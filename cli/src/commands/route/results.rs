@@ -19,7 +19,7 @@ pub(super) struct RoutePoint {
     /// Seconds, where time counts.
     pub(super) time: Option<f64>,
     pub(super) position: DVec3,
-    /// The normal of the surface; `None` where the surface has one side, or its normals cancel out.
+    /// The normal of the surface; `None` if the surface has one side, or its normals cancel out.
     pub(super) normal: Option<DVec3>,
 }
 

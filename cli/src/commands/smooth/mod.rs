@@ -275,7 +275,7 @@ fn smoothed(
     })
 }
 
-/// The lowest multiple of a rate that has a frame at the end of a clip too, which has one at `frame`.
+/// The lowest multiple of a rate that has a frame at `end`, too, if the rate has a frame at `frame`.
 fn rate_with_frame_at(rate: FrameRate, frame: f64, end: f64) -> Option<FrameRate> {
     (2..=20).find_map(|factor| {
         let finer = rate.times(factor).ok()?;
@@ -284,10 +284,11 @@ fn rate_with_frame_at(rate: FrameRate, frame: f64, end: f64) -> Option<FrameRate
     })
 }
 
-/// The largest rotation between the ends of a loop that rounding or a recording explains, in degrees.
+/// The largest angle between the ends of a loop that may be due to rounding or to the recording, in degrees.
 const CLOSED: f64 = 1.0;
 
-/// Warns of the joint that differs most between the first and the last sample, which a loop has equal.
+/// Warns if the first and the last sample differ, although they are equal in a loop. The warning names the joint that
+/// differs most.
 fn warn_of_open_loop(name: &str, clip: &Motion, samples: &Samples) {
     let tracks = clip.set.track_count();
     let last = samples.rotations.len().saturating_sub(tracks);
@@ -307,7 +308,7 @@ fn warn_of_open_loop(name: &str, clip: &Motion, samples: &Samples) {
     }
 }
 
-/// Writes the rotations of one clip that is nothing else, or clips as a motion file, as `tumble eval` does.
+/// Writes a result as `tumble eval` does: the rotations of one clip that has nothing else, or clips as a motion file.
 fn write(
     work: &ClipWork,
     clips: &[&Motion],

@@ -1,4 +1,5 @@
-//! Samples before and after smoothing: how fast the joint turns and moves that had the most noise.
+//! A picture of samples before and after smoothing: the angular velocity and the velocity of the joint that had the
+//! most noise.
 
 use glam::{Quat, Vec3};
 use tumble_formats::sample::Samples;
@@ -95,7 +96,7 @@ fn figure(subject: &SmoothingSubject<'_>) -> Figure {
     }
 }
 
-/// The track whose samples smoothing has changed most; `None` where nothing changed.
+/// The track whose samples smoothing has changed most; `None` if nothing changed.
 fn noisiest<T>(
     before: &[T],
     after: &[T],

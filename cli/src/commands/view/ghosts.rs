@@ -20,7 +20,7 @@ impl FoundGhosts {
         self.ghosts.is_empty()
     }
 
-    /// Gives the clips their ghosts, and prints what is to be known about these.
+    /// Gives the clips their ghosts, and prints the notes about the ghosts.
     pub(crate) fn give(self, shown: &mut [ShownClip]) {
         self.notes.iter().for_each(|note| words::note(note));
         for (index, ghost) in self.ghosts {
@@ -51,7 +51,7 @@ pub(crate) fn find_ghosts(shown: &[ShownClip]) -> FoundGhosts {
 }
 
 impl FoundGhosts {
-    /// The clips of one input as ghosts of those of another; each input with the index of its first clip.
+    /// Adds the clips of one input as ghosts of the clips of another. Each input has the index of its first clip.
     fn add(&mut self, inputs: [(usize, &[ShownClip]); 2]) {
         let [(first, clips), (second, others)] = inputs;
         let all = [clips, others].map(|side| -> Vec<Option<&str>> {
@@ -95,7 +95,7 @@ impl FoundGhosts {
     }
 }
 
-/// The second clip of a pair as a ghost of the first; and lines about it. `are_placed`: both have positions.
+/// The second clip of a pair as a ghost of the first, and notes about it. `are_placed`: whether both have positions.
 fn ghost_of(
     set: usize,
     pair: ClipPair<'_>,

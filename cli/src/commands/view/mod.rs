@@ -40,7 +40,7 @@ use tumble_formats::sample::MethodChoice;
 
 /// Bytes of rotations, speeds and positions that a page may hold, before they are packed.
 const MAX_PAGE_BYTES: f64 = 256e6;
-/// Up to this size, every method is shown where none is named.
+/// If no method is named, the page shows all methods as long as it is not larger than this.
 const SMALL_PAGE_BYTES: f64 = 24e6;
 
 /// Write an HTML file that shows boxes, skeletons or bodies on paths in 3D
@@ -235,7 +235,7 @@ impl Arguments {
         Ok(())
     }
 
-    /// Refuses `--no-ghosts` where there are none.
+    /// Refuses `--no-ghosts` if there are none.
     fn check_ghosts(&self, found: &FoundGhosts, inputs: usize) -> Result<(), Failure> {
         let on = match inputs {
             _ if !found.is_empty() => return Ok(()),
@@ -258,7 +258,7 @@ impl Arguments {
         Ok(tracks.select_with_ancestors(&clip, &name)?.into_owned())
     }
 
-    /// The page of clips that are read already, of a file of that name.
+    /// The page of clips that were read before from a file of this name.
     pub(crate) fn html(
         &self,
         path: &Path,
@@ -294,8 +294,7 @@ impl Arguments {
         Destination::new(out, self.overwrite, inputs)
     }
 
-    /// The methods of each clip: those asked for; else all, or the common ones where all would make
-    /// a large page.
+    /// The methods of each clip: the requested ones; otherwise all, or the common ones if all would make a large page.
     fn methods(&self, shown: &[ShownClip]) -> Result<Vec<Vec<ResultChoice>>, Failure> {
         if shown.is_empty() {
             return Err(Failure::usage("there is nothing to show: nothing moves"));
@@ -318,8 +317,8 @@ impl Arguments {
         fitting(shown, choices_by(&asked))
     }
 
-    /// The frames, and the keys between them where those are not many more: a key is
-    /// shown as it is.
+    /// The samples that are shown: the frames and, if there are not many more, the keys between them, so that keys are
+    /// shown exactly.
     fn sampled(&self, one: ShownClip) -> Result<ShownClip, Failure> {
         let (name, outside) = (&one.name, self.interpolation.outside());
         let frames = in_frames(self.fps, [self.start, self.end], &one.clip, outside, name)?;
@@ -439,7 +438,7 @@ fn bytes(shown: &[ShownClip], methods: &[Vec<ResultChoice>]) -> f64 {
         .sum()
 }
 
-/// `authored and 15 methods`: `authored` stands for the methods of the file, and is none itself.
+/// `authored and 15 methods`: `authored` is not counted as a method, because it stands for the methods of the file.
 fn counted_choices(methods: &[Vec<ResultChoice>]) -> String {
     let choices = each_once(methods.iter().flatten());
     let is_authored = |choice: &ResultChoice| *choice == ResultChoice::By(MethodChoice::AUTHORED);

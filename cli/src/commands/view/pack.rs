@@ -37,9 +37,9 @@ pub(crate) fn text(packed: &[u8]) -> String {
     STANDARD.encode(packed)
 }
 
-/// 16-bit integers, each as its difference from the one `stride` before it, which is
-/// small where those are a component of neighbouring samples; all low bytes first, then
-/// all high bytes, which are mostly alike.
+/// 16-bit integers, each as its difference from the integer `stride` places before it. Differences are small if these
+/// two are the same component of neighbouring samples. All low bytes are first, then all high bytes, which are mostly
+/// equal.
 pub(crate) fn differences(values: &[u16], stride: usize) -> String {
     let difference = |(index, value): (usize, &u16)| match index.checked_sub(stride) {
         Some(before) => value.wrapping_sub(values[before]),

@@ -38,9 +38,9 @@ pub(crate) struct Page<'a> {
     /// The ground first, then what stands on it.
     meshes: Vec<StoredMesh>,
     skins: Vec<StoredSkin>,
-    /// The engine, packed by gzip, where a set is to be evaluated in the page.
+    /// The engine, packed by gzip, if the page evaluates a set.
     engine: Option<String>,
-    /// How it interpolates, by the names of the npm package.
+    /// The options of interpolation, by their names in the npm package.
     options: BTreeMap<&'static str, String>,
 }
 
@@ -75,7 +75,7 @@ struct StoredSkin {
     triangles: String,
     /// Four bones of each vertex, u16.
     bones_of: String,
-    /// How much of each it follows, to be divided by 65535.
+    /// The weight of each of these bones, to be divided by 65535.
     weights: String,
     /// The joint of each bone.
     joints: Vec<usize>,
@@ -109,7 +109,7 @@ struct StoredClip {
 }
 
 impl StoredClip {
-    /// Nothing for paths, and for clips whose keys would make a large page.
+    /// `None` for paths, and for clips whose keys would make a large page.
     fn new(shown: &ShownClip) -> Option<Self> {
         let keys = packed::to_bytes(&shown.clip);
         if shown.path.is_some() || keys.len() > MAX_KEY_BYTES {
@@ -180,7 +180,7 @@ pub(crate) struct StoredSet {
     keys: String,
     /// The first of them is shown first.
     results: Vec<StoredResult>,
-    /// The clip that the page's engine evaluates; `None` where the page only shows the stored results.
+    /// The clip that the page's engine evaluates; `None` if the page only shows the stored results.
     clip: Option<StoredClip>,
     /// Whether joints have scales: meshes that follow them are then drawn by the engine's matrices alone.
     has_scales: bool,

@@ -96,12 +96,12 @@ pub(crate) struct Ghost {
     pub(super) pairs: Vec<[usize; 2]>,
     /// Whether their rotations are compared in the world, instead of relative to the parents.
     pub(super) in_world: bool,
-    /// Which joints are not compared, or not as a reader expects, and why.
+    /// A note about joints that are not compared, or not as a reader expects, with the reason.
     pub(super) note: String,
 }
 
 impl ShownClip {
-    /// A clip of that input, without times. `is_one_of_several`: of the input's clips.
+    /// A clip of this input, without times. `is_one_of_several`: whether the input has several clips.
     pub(crate) fn new(
         path: &Path,
         clip: Motion,
@@ -258,7 +258,7 @@ impl ShownClip {
         times
     }
 
-    /// The samples that frames mean for it.
+    /// The sample times of the clip for these frames.
     pub(crate) fn timeline(&self, frames: &SampleTimes) -> Result<Timeline, Failure> {
         let set = &self.clip.set;
         frames

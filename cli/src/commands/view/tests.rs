@@ -123,7 +123,7 @@ fn point(value: &Value) -> DVec3 {
     DVec3::new(coordinate(0), coordinate(1), coordinate(2))
 }
 
-/// The clips as the program shows them, in a browser; nothing where there is none.
+/// The clips as the program shows them, in a browser; nothing if there is none.
 fn opened(clips: Vec<Motion>, folder: &Path) -> (Vec<ShownClip>, Option<browser::Page>) {
     let arguments = arguments("--fps 10");
     let one = |clip| ShownClip::new(Path::new("clips/fox.glb"), clip, None, false);

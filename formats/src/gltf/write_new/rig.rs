@@ -22,7 +22,7 @@ pub(super) struct NewNodes {
     children_until: usize,
 }
 
-/// The joints of clips that are parts of one skeleton, or tracks without parents.
+/// The joints of several clips that belong to one skeleton; or tracks without parents.
 struct Rig {
     has_skeleton: bool,
     /// The node of each joint, by its parent node, its name, and its index among the joints with this name.

@@ -277,11 +277,13 @@ struct Association {
     in_gaps: usize,
 }
 
-/// Two times this close are one, in seconds: clocks that count from different seconds are rounded differently.
+/// Two times count as one if they are not further apart than this, in seconds, because times that count from different
+/// seconds are rounded differently.
 const SAME_TIME: f64 = 1e-9;
 
-/// A pose beyond the ends of the other path belongs to its end if it is not further away than this, in seconds: f64 of
-/// seconds since 1970 have steps of 0.2 µs, and formats that store times as f32 round them further.
+/// A pose beyond the ends of the other path belongs to its end if it is not further away than this, in seconds. The
+/// reason is rounding: an f64 of seconds since 1970 has steps of 0.2 µs, and formats that store times as f32 round them
+/// further.
 fn same_end(time: f64) -> f64 {
     (time.abs() * f64::from(f32::EPSILON)).clamp(5e-7, 1e-4)
 }
@@ -412,7 +414,7 @@ mod tests {
         associate(times, &measure)
     }
 
-    /// The times are those of the path with fewer poses where both are.
+    /// The times are those of the path with fewer poses, as far as the other path has poses there.
     #[test]
     fn the_denser_path_is_interpolated() {
         let dense = [0.0, 0.5, 1.0, 1.5, 5.0];

@@ -53,7 +53,7 @@ impl RowKeys {
 
 /// The keys of all rows of a table, whose positions have no origin yet.
 struct AllKeys {
-    /// Whether signs are to be continued, because the rotations have none.
+    /// Whether signs must be continued, because the stored form of the rotations has no sign.
     continues_signs: bool,
     rotations: Vec<Quat>,
     translations: Vec<DVec3>,

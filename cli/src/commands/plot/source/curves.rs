@@ -20,7 +20,7 @@ use crate::messages::exit::Failure;
 /// Components of a quaternion in the order of dimensions.
 pub(crate) const NAMES: [&str; 4] = ["w", "x", "y", "z"];
 
-/// Errors below this are none: the sample is exact.
+/// Smaller errors are drawn as none: the sample is exact.
 const EXACT: f64 = 1e-12;
 
 /// The subject of a figure. Boxes and dimensions count from 0 here.
@@ -128,7 +128,7 @@ impl PlotSource<'_> {
         } else {
             let of = |(index, one): (usize, &CurveChoice)| {
                 let (name, colour) = (one.method.name(), colours::of_choice(one.method));
-                // Later curves are drawn over earlier ones.
+                // Only later curves can hide a curve, because they are drawn over it.
                 let mut over = self.choices[index + 1..].iter().rev();
                 let hidden_by = over.find(|other| {
                     let other = colours::of_choice(other.method);
@@ -213,7 +213,8 @@ impl PlotSource<'_> {
             .flat_map(|curve| curve.pieces.iter().flatten());
         let shown = shown.chain(dots.iter().flat_map(|dots| &dots.points));
         let range = range_of(shown.map(|point| point.1));
-        // A name tells a joint; dimensions count the components of boxes without names.
+        // The title has the name of the track. If boxes have no names, the title has the number of the dimension
+        // instead, which counts the components of all boxes.
         let (name, is_named) = (self.box_name(index), has_name(self.set, index));
         let (title, label) = match components {
             [one] if is_named => (format!("{} of {name}", NAMES[*one]), NAMES[*one]),
@@ -272,7 +273,8 @@ impl PlotSource<'_> {
         Ok(self.panel(title, label, range, curves, vec![dots]))
     }
 
-    /// Where curves may lie on each other, those drawn first are broader.
+    /// The width of the `order`th curve. Curves that are drawn earlier are wider, so that they are visible where curves
+    /// cover each other.
     fn width(&self, order: usize) -> f64 {
         let above = self.choices.len() - 1 - order;
         1.6 + 1.8 * above.min(3) as f64
@@ -329,7 +331,7 @@ impl PlotSource<'_> {
         Ok(panel)
     }
 
-    /// Angle to the reference, radians, as powers of ten; where there is none, a gap.
+    /// Angle to the reference, radians, as powers of ten; if there is none, a gap.
     fn error(&self, device: &mut OpenedDevice, index: usize) -> Result<Panel, Failure> {
         let mut curves = Vec::new();
         let mut level = f64::NEG_INFINITY;
@@ -430,7 +432,7 @@ fn has_name(set: &TrackSet, index: usize) -> bool {
     set.track(index).name.is_some_and(|name| !name.is_empty())
 }
 
-/// The name of a scalar; `scalar 1` where it has none.
+/// The name of a scalar; `scalar 1` if it has none.
 pub(crate) fn scalar_name(clip: &Motion, index: usize) -> String {
     match clip.set.scalar(index).map_or("", |keys| keys.name) {
         "" => format!("scalar {}", index + 1),

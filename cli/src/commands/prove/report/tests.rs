@@ -7,7 +7,7 @@ use tumble_verify::renderer::{RendererCheck, RendererReport};
 use super::*;
 use crate::commands::prove::text;
 
-/// A complete proof. `None` where no device reports its limits.
+/// A complete proof. `None` if no device reports its limits.
 fn whole() -> Option<Proof> {
     let devices = Device::list().unwrap_or_default();
     assert!(

@@ -10,7 +10,7 @@ use crate::commands::render::film::{Patch, Picture, delays};
 
 /// The index of the palette for pixels that have not changed.
 const UNCHANGED: u8 = 255;
-/// Bits of a channel that decide about a colour of the palette.
+/// The number of upper bits of each channel by which the palette's colour for a pixel is looked up.
 const BITS: u32 = 6;
 
 /// A GIF being written.
@@ -19,14 +19,14 @@ pub(crate) struct Gif<W: Write> {
     width: usize,
     size: (u32, u32),
     delays: std::vec::IntoIter<u16>,
-    /// The palette's colour for every colour, coarsely.
+    /// For the upper bits of a colour ([`BITS`] of each channel), the index of the palette's nearest colour.
     nearest: Vec<u8>,
     before: Option<Vec<u8>>,
 }
 
 impl<W: Write> Gif<W> {
-    /// Frames of that size, shown at those times, in colours that suit `sample`. Browsers
-    /// show no frame for less than a fiftieth of a second.
+    /// A film of frames of this size, which are shown at these times. The palette suits the pixels of `sample`. No
+    /// frame is shown for less than a fiftieth of a second, because browsers would show it longer.
     pub(crate) fn new(
         out: W,
         size: (u32, u32),

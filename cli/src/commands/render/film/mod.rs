@@ -22,7 +22,7 @@ struct Patch {
 }
 
 impl Patch {
-    /// The smallest that holds every pixel that differs; one pixel where none does.
+    /// The smallest rectangle with all pixels that differ; one pixel if none differs.
     fn of(before: &[u8], now: &[u8], width: usize) -> Self {
         let row = width * 3;
         let differs = |offset: usize| before[offset..offset + 3] != now[offset..offset + 3];
@@ -62,7 +62,7 @@ impl Patch {
         }
     }
 
-    /// Its rows of a picture that wide.
+    /// The rows of this rectangle in a picture of this width.
     fn rows(self, pixels: &[u8], width: usize) -> impl Iterator<Item = &[u8]> {
         (self.top..self.top + self.height).map(move |y| {
             let start = (y * width + self.left) * 3;

@@ -66,8 +66,9 @@ impl Request<'_> {
     }
 
     /// Prepares this request for recording at times that are known only when they are recorded
-    /// ([`TimedTarget::record`]): for a clip at another time in each frame. The request's own times say how many samples
-    /// there are. The kernels are compiled here. A set is prepared and uploaded here as a whole.
+    /// ([`TimedTarget::record`]): for a clip at another time in each frame. The number of times in the request is the
+    /// number of samples of each recording. The kernels are compiled here. A set is prepared and uploaded here as a
+    /// whole.
     ///
     /// # Errors
     /// As [`Request::target`].
@@ -166,10 +167,10 @@ impl TimedTarget {
     /// samples, the same for all tracks. The result starts `offset` bytes after the start of the target's range. It has
     /// the bits of an evaluation at [`SampleTimes::at`](crate::SampleTimes::at) these times.
     ///
-    /// Nothing is submitted or waited for. The host finds the segment of each sample, because a device would round its
-    /// time before, and the commands contain what it found: about 28 bytes for each sample of a track. Barriers are
-    /// included, as for [`ClipTarget::record`](crate::gpu::clip::ClipTarget::record). Several recordings of a target may
-    /// be in flight on one queue. If the commands are submitted again, they evaluate the same times.
+    /// Nothing is submitted or waited for. The host finds the segment of each sample, because a device would round the
+    /// time first. The segments are written into the commands, about 28 bytes for each sample of a track. Barriers are
+    /// included, as for [`ClipTarget::record`](crate::gpu::clip::ClipTarget::record). Several recordings of a target
+    /// may be in flight on one queue. If the commands are submitted again, they evaluate the same times.
     ///
     /// # Errors
     /// When there is another number of times, a time is not finite, the result does not fit at this offset, `offset` is
@@ -183,7 +184,7 @@ impl TimedTarget {
         offset: u64,
         times: &[f64],
     ) -> Result<(), Error> {
-        // SAFETY: promised by the caller.
+        // SAFETY: as the caller promises.
         unsafe { self.record_between(commands, offset, times, CommandScopes::default()) }
     }
 
@@ -202,7 +203,7 @@ impl TimedTarget {
         times: &[f64],
         scopes: CommandScopes,
     ) -> Result<(), Error> {
-        // SAFETY: promised by the caller.
+        // SAFETY: as the caller promises.
         let commands = unsafe { Commands::new(&self.clip.engine().device, commands) };
         let commands = commands.between(scopes.with_earlier_recordings());
         Ok(self.clip.record_at(commands, offset, times)?)
