@@ -155,7 +155,8 @@ impl Decimal {
 
     /// Seconds after a whole second, correctly rounded.
     pub(crate) fn since(self, whole: i64) -> f64 {
-        match self.0.checked_sub(i128::from(whole) * SECOND) {
+        let steps = i128::from(whole).checked_mul(SECOND);
+        match steps.and_then(|steps| self.0.checked_sub(steps)) {
             // The text of the difference has only digits and a point, so it can be parsed as an f64, correctly rounded.
             Some(difference) => Self(difference).to_string().parse().unwrap_or(f64::NAN),
             // Such a number is a whole number in f64, so its whole seconds are exact.
