@@ -921,7 +921,7 @@ fn times_outside_the_keys_are_left_out_or_refused() {
     let line = "eval a.dat -o none.csv --fps 2 --start 5 --end 6 --after leave-out";
     let refused = run(folder, &line.split(' ').collect::<Vec<_>>());
     assert!(
-        refused.code == 4 && refused.words.contains("none of the times"),
+        refused.code == 4 && refused.words.contains("none of the requested times"),
         "{}",
         refused.words
     );
