@@ -206,7 +206,9 @@ pub enum CrowdError {
         seconds: f64,
     },
     /// A duration, or a time of the clock, is negative.
-    #[error("{seconds} s is negative; a crowd's clock starts at 0 and advances by steps of 0 s or more")]
+    #[error(
+        "{seconds} s is negative; a crowd's clock starts at 0 and advances by steps of 0 s or more"
+    )]
     NegativeSeconds {
         /// The duration in seconds.
         seconds: f64,

@@ -2406,7 +2406,7 @@ TumbleResult tumble_crowd_passed_events(const struct TumbleCrowd *crowd,
  `instances` must have `count` numbers.
  */
 TumbleResult tumble_crowd_set_visible(struct TumbleCrowd *crowd,
-                                      const uint32_t *instances,
+                                      const size_t *instances,
                                       size_t count);
 
 /*

@@ -638,7 +638,7 @@ fn joints_are_matched_by_name() {
     let refused = skeleton.with_names(["one"]).unwrap_err();
     assert_eq!(
         refused.to_string(),
-        "1 names for 9 tracks; give one for each"
+        "1 name for 9 tracks; give one for each"
     );
 }
 

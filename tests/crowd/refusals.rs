@@ -1,7 +1,7 @@
 //! Calls that a crowd refuses: the error names the cause, and nothing is changed.
 
 use glam::{Affine3A, Quat, Vec3};
-use tumble::crowd::{CrowdError, CrowdLayer, CrowdLibrary, CrowdValues};
+use tumble::crowd::{CrowdError, CrowdLayer, CrowdLibrary, CrowdOutput, CrowdValues};
 use tumble::{Axes, Interpolation, Quantity, Skeleton, TrackSet, VectorMethod, WrapMode, method};
 
 use super::{bits, clip, cpu, evaluated, library};
@@ -90,7 +90,7 @@ fn libraries_refuse_what_does_not_fit() {
     let nowhere = Affine3A::from_translation(Vec3::NAN);
     let refused = library.set_inverse_bind(&[nowhere]).unwrap_err();
     assert_eq!(refused, CrowdError::BindNotFinite { joint: 0 });
-    assert!(library.set_inverse_bind(&[]).is_err());
+    assert!(library.set_inverse_bind::<[[f32; 4]; 3]>(&[]).is_err());
     assert!(library.set_reference(0, 99, 0).is_err());
 }
 
@@ -138,12 +138,21 @@ fn crowds_refuse_what_is_not_there_and_stay_as_they_were() {
     }
     assert!(crowd.set(3, 0, plays).is_err() && crowd.set(0, 2, plays).is_err());
     assert!(crowd.get(3, 0).is_err() && crowd.tick(0, 2).is_err());
-    for seconds in [f64::NAN, f64::INFINITY, -1.0, 1e300] {
+    for seconds in [f64::NAN, f64::INFINITY, 1e300] {
         let refused = crowd.advance(seconds).unwrap_err();
         assert!(matches!(refused, CrowdError::Seconds { .. }));
     }
+    let seconds = -1.0;
+    let negative = CrowdError::NegativeSeconds { seconds };
+    assert_eq!(crowd.advance(seconds).unwrap_err(), negative);
+    assert_eq!(crowd.clock_ticks(seconds).unwrap_err(), negative);
+    assert_eq!(crowd.ticks_of(seconds).unwrap(), -705_600);
+    assert_eq!(crowd.clock_ticks(0.5).unwrap(), 352_800);
     assert!(crowd.ticks_of(f64::NAN).is_err() && crowd.set_clock(u64::MAX).is_err());
     let needed = crowd.output_len(CrowdValues::Model);
+    assert_eq!(crowd.output_bytes(CrowdValues::Model), 16 * needed as u64);
+    let half = CrowdOutput::half(CrowdValues::Model);
+    assert_eq!(crowd.output_bytes(half), 8 * needed as u64);
     let mut short = vec![[0.0; 4]; needed - 1];
     let refused = crowd.evaluate_into(CrowdValues::Model, &mut short);
     let length = needed - 1;
