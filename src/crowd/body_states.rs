@@ -402,27 +402,35 @@ impl Group<'_> {
             if !has_velocities {
                 continue;
             }
+            self.differ::<L>(here, ends, body);
+            let three = |[x, y, z, _]: [f32; 4]| [x, y, z];
+            let rates = &here.body.angular_velocities[lanes];
+            put(states.angular_velocities, at, rates, three);
             if point != body {
                 here.find::<L>(point, self.moves);
+                self.differ::<L>(here, ends, point);
             }
-            if let Some(steps) = self.steps {
-                for end in &mut *ends {
-                    end.find::<L>(point, false);
-                }
-                let ends = [&ends[0].body, &ends[1].body];
-                for (lane, step) in steps.iter().enumerate() {
-                    here.body.differ(lane, ends, step.per_second);
-                }
-            }
-            let rows = &here.body;
-            let three = |[x, y, z, _]: [f32; 4]| [x, y, z];
-            put(states.velocities, at, &rows.velocities[lanes], three);
-            put(
-                states.angular_velocities,
-                at,
-                &rows.angular_velocities[lanes],
-                three,
-            );
+            put(states.velocities, at, &here.body.velocities[lanes], three);
+        }
+    }
+
+    /// With steps, sets the velocities of the body, which is this frame, to differences.
+    #[inline(always)]
+    fn differ<L: Lanes>(
+        &self,
+        here: &mut SampleScratch,
+        ends: &mut [SampleScratch; 2],
+        frame: u32,
+    ) {
+        let Some(steps) = self.steps else {
+            return;
+        };
+        for end in &mut *ends {
+            end.find::<L>(frame, false);
+        }
+        let ends = [&ends[0].body, &ends[1].body];
+        for (lane, step) in steps.iter().enumerate() {
+            here.body.differ(lane, ends, step.per_second);
         }
     }
 }
