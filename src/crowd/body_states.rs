@@ -342,7 +342,7 @@ fn put_bodies<L: Lanes>(
     let has_velocities = !(states.velocities.is_empty() && states.angular_velocities.is_empty());
     for (index, (&body, &point)) in bodies.iter().zip(points).enumerate() {
         let at = (index, bodies.len());
-        let mut state = frame::<L>(&here.frames, body);
+        let state = frame::<L>(&here.frames, body);
         let zero = L::all(0.0);
         let [x, y, z] = state.position;
         put::<L, _>(states.positions, [x, y, z, zero], at, three);
@@ -355,16 +355,17 @@ fn put_bodies<L: Lanes>(
         if !has_velocities {
             continue;
         }
-        if point != body {
-            state = frame::<L>(&here.frames, point);
-        }
-        if let Some(Differences { ends, per_second }) = differences {
-            let [before, after] = ends.each_ref().map(|end| frame::<L>(&end.frames, point));
-            state.differ(&before, &after, *per_second);
-        }
-        let [x, y, z] = state.velocity;
+        let [linear, angular] = [point, body].map(|index| {
+            let mut state = frame::<L>(&here.frames, index);
+            if let Some(Differences { ends, per_second }) = differences {
+                let [before, after] = ends.each_ref().map(|end| frame::<L>(&end.frames, index));
+                state.differ(&before, &after, *per_second);
+            }
+            state
+        });
+        let [x, y, z] = linear.velocity;
         put::<L, _>(states.velocities, [x, y, z, zero], at, three);
-        let [x, y, z] = state.angular_velocity;
+        let [x, y, z] = angular.angular_velocity;
         put::<L, _>(states.angular_velocities, [x, y, z, zero], at, three);
     }
 }

@@ -149,7 +149,7 @@ impl Tree {
     pub fn walk_memory(&self) -> WalkMemory {
         WalkMemory {
             state: (self.rest(), self.no_rates()),
-            joints: JointNumbers::new(self.counts),
+            joints: JointNumbers::new(self.counts, MAX_LANES),
             frames: Vec::new(),
         }
     }
@@ -187,7 +187,7 @@ impl TreeWalk {
         configuration: &Configuration,
         rates: Option<&ConfigurationRates>,
     ) -> Vec<BodyMotion> {
-        let mut joints = JointNumbers::new(self.counts);
+        let mut joints = JointNumbers::new(self.counts, 1);
         joints.set(0, configuration, rates);
         let mut walked = vec![0.0; self.frames.len() * FRAME];
         walk::<f64>(&self.frames, &joints, 0, rates.is_some(), &mut walked);
@@ -219,7 +219,7 @@ impl TreeWalk {
             frames,
         } = memory;
         if joints.counts != self.counts {
-            *joints = JointNumbers::new(self.counts);
+            *joints = JointNumbers::new(self.counts, MAX_LANES);
         }
         frames.resize(self.frames.len() * FRAME * MAX_LANES, 0.0);
         let width = VectorWidth::widest();

@@ -9,7 +9,6 @@ use crate::pose::tree::{
     BodyMotion, BodyPose, BodyVelocity, Configuration, ConfigurationRates, JointCounts,
 };
 use crate::simd::doubles::Doubles;
-use crate::simd::lanes::MAX_LANES;
 
 /// A frame with constants whose form tells what can be left out.
 #[derive(Debug, Clone, PartialEq)]
@@ -112,23 +111,26 @@ const POSE: usize = 13;
 const BALL: usize = 7;
 const SCALAR: usize = 2;
 
-/// The values of the joints of [`MAX_LANES`] configurations, `[number][configuration]`: poses (the base and free joints),
-/// balls, scalars, each with its rates.
-#[derive(Debug, Clone, Default)]
+/// The values of the joints of some configurations, `[number][configuration]`: poses (the base and free joints), balls,
+/// scalars, each with its rates.
+#[derive(Debug, Clone)]
 pub(super) struct JointNumbers {
     pub(super) counts: JointCounts,
+    /// The number of configurations.
+    lanes: usize,
     numbers: Vec<f64>,
     balls: usize,
     scalars: usize,
 }
 
 impl JointNumbers {
-    pub(super) fn new(counts: JointCounts) -> Self {
+    pub(super) fn new(counts: JointCounts, lanes: usize) -> Self {
         let balls = (1 + counts.free) * POSE;
         let scalars = balls + counts.balls * BALL;
         Self {
             counts,
-            numbers: vec![0.0; (scalars + counts.scalars * SCALAR) * MAX_LANES],
+            lanes,
+            numbers: vec![0.0; (scalars + counts.scalars * SCALAR) * lanes],
             balls,
             scalars,
         }
@@ -142,14 +144,15 @@ impl JointNumbers {
         rates: Option<&ConfigurationRates>,
     ) {
         let Self {
+            lanes,
             ref mut numbers,
             balls,
             scalars,
             ..
         } = *self;
         let mut put = |first: usize, step: usize, values: &[f64]| {
-            let lanes = numbers[first * MAX_LANES + lane..].iter_mut();
-            for (number, &value) in lanes.step_by(step * MAX_LANES).zip(values) {
+            let numbers = numbers[first * lanes + lane..].iter_mut();
+            for (number, &value) in numbers.step_by(step * lanes).zip(values) {
                 *number = value;
             }
         };
@@ -181,6 +184,7 @@ impl JointNumbers {
     #[inline(always)]
     fn after(&self, lane: usize) -> LaneNumbers<'_> {
         LaneNumbers {
+            lanes: self.lanes,
             numbers: &self.numbers[lane..],
             balls: self.balls,
             scalars: self.scalars,
@@ -191,6 +195,7 @@ impl JointNumbers {
 /// The values of the joints of as many configurations as a vector has lanes.
 #[derive(Clone, Copy)]
 struct LaneNumbers<'a> {
+    lanes: usize,
     numbers: &'a [f64],
     balls: usize,
     scalars: usize,
@@ -199,7 +204,7 @@ struct LaneNumbers<'a> {
 impl LaneNumbers<'_> {
     #[inline(always)]
     fn number<D: Doubles>(self, index: usize) -> D {
-        D::load(&self.numbers[index * MAX_LANES..])
+        D::load(&self.numbers[index * self.lanes..])
     }
 
     #[inline(always)]
