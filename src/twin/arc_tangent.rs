@@ -3,9 +3,7 @@
 
 use crate::shader::*;
 use crate::simd::lanes::{Choice, Number};
-#[cfg(test)]
-pub(crate) use crate::twin::functions::arc_tangent;
-pub(crate) use crate::twin::functions::{flushed, reciprocal, reciprocal_root, root};
+pub(crate) use crate::twin::functions::{arc_tangent, flushed, reciprocal, reciprocal_root, root};
 
 /// The root of a number of which the reciprocal root is known.
 #[inline(always)]
