@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use crate::crowd::channel_curve::constants_of;
 use crate::crowd::clip_keys::{KeyRows, keeps_keys};
 use crate::crowd::clip_tables::{ClipTables, arcs, runs_of};
-use crate::crowd::lane_states::{Group, put_differences, put_states, walk};
+use crate::crowd::lane_states::{InstanceGroup, put_differences, put_states, walk};
 use crate::crowd_error::CrowdError;
 use crate::engine::Engine;
 use crate::math::canonical::canonical;
@@ -874,7 +874,7 @@ impl InLanes for StatesTask<'_, '_> {
             let mut outputs = states.split_off(instances.len() * joints);
             if is_posed {
                 poses.locate(instances, pose);
-                let group = Group {
+                let group = InstanceGroup {
                     poses,
                     at: instances,
                     located: &pose.located,
@@ -894,7 +894,7 @@ impl InLanes for StatesTask<'_, '_> {
                 }
                 let at = &at[..instances.len()];
                 poses.locate(at, pose);
-                let group = Group {
+                let group = InstanceGroup {
                     poses,
                     at,
                     located: &pose.located,
