@@ -25,10 +25,10 @@ pub(crate) fn dot(a: DQuat, b: DQuat) -> f64 {
     a.x * b.x + a.y * b.y + a.z * b.z + a.w * b.w
 }
 
-/// Each component rounded to f32.
+/// Each component rounded to f32. Not by `map` of an array, which is a call for each component.
 #[inline(always)]
 pub(crate) fn rounded(q: DQuat) -> Quat {
-    Quat::from_array(q.to_array().map(|component| component as f32))
+    q.as_quat()
 }
 
 /// The unit quaternion nearest to `q`, in f32.

@@ -3,7 +3,7 @@
 
 use rayon::prelude::*;
 
-use crate::crowd::lane_states::{Group, put, three};
+use crate::crowd::lane_states::{InstanceGroup, put, three};
 use crate::crowd::states::{
     FrameStep, JOINT_NUMBERS, MotionTables, PoseScratch, PoseValues, Poses, TASK, check_clips,
     check_steps, ends_of_steps, steps_per_second,
@@ -233,7 +233,7 @@ impl SampleScratch {
         self.frames
             .resize(frames.len() * FRAME_NUMBERS * L::COUNT, 0.0);
         poses.locate(at, pose);
-        let group = Group {
+        let group = InstanceGroup {
             poses,
             at,
             located: &pose.located,

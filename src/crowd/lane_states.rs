@@ -18,7 +18,7 @@ use crate::twin::functions::{polynomial_begin, polynomial_end};
 
 /// Some instances, at most as many as a vector has lanes, each with a clip and a tick.
 #[derive(Clone, Copy)]
-pub(super) struct Group<'a> {
+pub(super) struct InstanceGroup<'a> {
     pub(super) poses: Poses<'a>,
     pub(super) at: &'a [(u32, u32)],
     pub(super) located: &'a LocatedTicks,
@@ -31,7 +31,7 @@ struct LaneClip<'a> {
     moment: ClipMoment<'a>,
 }
 
-/// What the rotations of one joint are computed of, for each lane.
+/// The sources of the rotations of one joint, for each lane.
 #[derive(Default)]
 struct LaneSources {
     /// The cells of the keys at both ends of an arc; of a polynomial the first constant, and the cells from one to the next.
@@ -39,7 +39,7 @@ struct LaneSources {
     second: [u32; MAX_LANES],
     /// The cell of a value that is taken as it is, where `copied` is not 0.
     key: [u32; MAX_LANES],
-    /// Which value is taken as it is: none, that in `first` or `key`, or that in `second`.
+    /// The value that is taken as it is: 0 for none, [`START`] or [`END`].
     copied: [f32; MAX_LANES],
     is_any_copied: bool,
     parameters: [f32; MAX_LANES],
@@ -47,14 +47,16 @@ struct LaneSources {
     factors: [f32; MAX_LANES],
 }
 
-/// `copied` of a value at the start of an arc, or of any polynomial; and of one at the end of an arc.
+/// The key at the start of an arc, or the key of a polynomial.
 const START: f32 = 1.0;
+
+/// The key at the end of an arc.
 const END: f32 = 2.0;
 
 /// A rotation in the parent's frame, and the angular velocity about the parent's axes.
 type Rotating<L> = ([L; 4], [L; 3]);
 
-impl Group<'_> {
+impl InstanceGroup<'_> {
     /// Computes the states in the parents' frames to `numbers`, which has [`JOINT_NUMBERS`] vectors for each joint, and the
     /// rotations to `local`, `[instance][joint]`, if it is not empty.
     #[inline(always)]
@@ -279,9 +281,9 @@ fn arcs<L: Lanes>(
     let mut rotation = canonical(on_arc(middle, tangent, norm_squared(tangent), parameters));
     if sources.is_any_copied {
         let copied = L::load(&sources.copied);
-        for c in 0..4 {
-            let at_end = copied.where_equal(END, ends[c], rotation[c]);
-            rotation[c] = copied.where_equal(START, starts[c], at_end);
+        for (component, (start, end)) in rotation.iter_mut().zip(starts.into_iter().zip(ends)) {
+            let at_end = copied.where_equal(END, end, *component);
+            *component = copied.where_equal(START, start, at_end);
         }
     }
     let zero = L::all(0.0);
@@ -361,17 +363,17 @@ fn polynomials<L: Lanes>(
     if sources.is_any_copied {
         let copied = L::load(&sources.copied);
         let keys = L::gather_rotations(cells, &sources.key);
-        for c in 0..4 {
-            rotation[c] = copied.where_equal(START, keys[c], rotation[c]);
+        for (component, key) in rotation.iter_mut().zip(keys) {
+            *component = copied.where_equal(START, key, *component);
         }
     }
     let mut angular_velocity = [zero, zero, zero];
     if moves {
         let (mut value, mut slope) = (coefficients[POWERS - 1], [zero, zero, zero, zero]);
         for row in coefficients[..POWERS - 1].iter().rev() {
-            for c in 0..4 {
-                slope[c] = slope[c] * s + value[c];
-                value[c] = value[c] * s + row[c];
+            for ((slope, value), &coefficient) in slope.iter_mut().zip(&mut value).zip(row) {
+                *slope = *slope * s + *value;
+                *value = *value * s + coefficient;
             }
         }
         angular_velocity = angular_velocities(value, slope, &sources.factors);

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use crate::crowd::channel_curve::constants_of;
 use crate::crowd::clip_keys::{KeyRows, keeps_keys};
 use crate::crowd::clip_tables::{ClipTables, runs_of};
-use crate::crowd::lane_states::{Group, put_differences, put_states, walk};
+use crate::crowd::lane_states::{InstanceGroup, put_differences, put_states, walk};
 use crate::crowd_error::CrowdError;
 use crate::engine::Engine;
 use crate::math::canonical::canonical;
@@ -825,7 +825,7 @@ impl InLanes for StatesTask<'_, '_> {
             let mut outputs = states.split_off(instances.len() * joints);
             if is_posed {
                 poses.locate(instances, pose);
-                let group = Group {
+                let group = InstanceGroup {
                     poses,
                     at: instances,
                     located: &pose.located,
@@ -842,7 +842,7 @@ impl InLanes for StatesTask<'_, '_> {
                 let at = ends_of_steps(instances, steps, side);
                 let at = &at[..instances.len()];
                 poses.locate(at, pose);
-                let group = Group {
+                let group = InstanceGroup {
                     poses,
                     at,
                     located: &pose.located,

@@ -431,6 +431,22 @@ fn differences_are_those_of_the_two_ticks() {
     tables
         .differences_into(&engine, parts, &at, &steps, arrays)
         .unwrap();
+    for width in VectorWidth::available() {
+        let mut options = EngineOptions::default();
+        options.vector_width = Some(width);
+        let engine = Engine::with_options(Device::Cpu, &options).unwrap();
+        let mut found = [vec![[0.0f32; 3]; count], vec![[0.0f32; 3]; count]];
+        let [velocities_there, angular_there] = &mut found;
+        let arrays = MotionStates {
+            velocities: velocities_there,
+            angular_velocities: angular_there,
+            ..MotionStates::default()
+        };
+        tables
+            .differences_into(&engine, parts, &at, &steps, arrays)
+            .unwrap();
+        assert_eq!(found, [velocities.clone(), angular.clone()], "{width:?}");
+    }
     let of = |end: usize| -> StateResults {
         let at: Vec<(u32, u32)> = (at.iter().zip(&steps))
             .map(|(&(clip, _), step)| (clip, step.ticks[end]))

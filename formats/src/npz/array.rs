@@ -119,8 +119,11 @@ impl Array<'_> {
             for (track, list) in tracks.clone().zip(&mut lists) {
                 let key = |frame: usize| {
                     let first = at.first + track * at.track + frame * at.frame;
-                    let component = |i: usize| number(numbers[first + i * at.component]);
-                    M::make(std::array::from_fn(component))
+                    let mut components = [0.0; N];
+                    for (i, component) in components.iter_mut().enumerate() {
+                        *component = number(numbers[first + i * at.component]);
+                    }
+                    M::make(components)
                 };
                 list.extend((from..(from + IN_CACHE).min(frames)).map(key));
             }
