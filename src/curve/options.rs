@@ -127,7 +127,7 @@ pub enum KeySigns {
 }
 
 names! {
-    KeySigns, "path",
+    KeySigns, "kind of signs",
     Shortest => "shortest",
     AsAuthored => "as-authored",
 }
