@@ -127,7 +127,7 @@ pub enum KeySigns {
 }
 
 names! {
-    KeySigns, "path",
+    KeySigns, "kind of signs",
     Shortest => "shortest",
     AsAuthored => "as-authored",
 }
@@ -185,7 +185,7 @@ pub enum Ends {
     Secant,
     /// The curve is closed: the last key equals the first, and the curve is smooth there.
     Loop,
-    /// The first and the last interval are constant, with the value of the first key of each.
+    /// The first and the last interval are constant; each has the value of the key at its start.
     Frozen,
 }
 

@@ -15,9 +15,10 @@ use crate::tracks::set::Track;
 /// glTF's CUBICSPLINE: a normalised cubic in each component, with the tangents of
 /// [`TrackSet::set_tangents`](crate::tracks::set::TrackSet::set_tangents).
 ///
-/// In a track with tangents keys keep their signs, as glTF specifies. Tracks without tangents are none of glTF's: there
-/// all tangents are 0, each key is at rest, and [`Interpolation::signs`] applies as for every method. Keys from angles
-/// or of other samplers may have any signs, and between `q` and nearly `-q` the cubic would rotate at any speed.
+/// In a track with tangents, keys keep their signs, as glTF specifies. A track without tangents does not come from a
+/// CUBICSPLINE of glTF: all its tangents are 0, each key is at rest, and [`Interpolation::signs`] applies as for every
+/// method. The keys of such a track may have any signs, for example if they were computed from angles; with these signs,
+/// the cubic between `q` and nearly `-q` would rotate extremely fast.
 pub const GLTF_CUBIC: Method = Method {
     name: "gltf-cubic",
     summary: "glTF's CUBICSPLINE, exactly as specified; without tangents each key is at rest",

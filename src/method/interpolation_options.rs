@@ -53,7 +53,7 @@ pub enum OptionValueError {
     /// The option has no value of this name.
     #[error(transparent)]
     Name(#[from] UnknownNameError),
-    /// The option is a number, and the text is none.
+    /// The option is a number, and the text is not a number.
     #[error("{option} is `{text}`, which is not a number")]
     NotNumber {
         /// The name of the option.

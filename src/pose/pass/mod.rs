@@ -47,8 +47,8 @@ pub enum PosePass<'a> {
         base: VulkanBuffer,
         /// The rotations whose difference from the reference is added.
         layer: VulkanBuffer,
-        /// A rotation for each track. Frame by frame, they take up to a mebibyte of the device's memory, or as much
-        /// as 16 frames if that is more; track by track, as much as a layer.
+        /// A rotation for each track. In the layout frame by frame, the references take up to a mebibyte of the
+        /// device's memory, or as much as 16 frames if this is more; in the layout track by track, as much as a layer.
         reference: &'a [Quat],
         /// The weight, 0 to 1.
         weight: f32,

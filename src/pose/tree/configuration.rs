@@ -7,7 +7,8 @@ use crate::pose::tree::{JointCounts, JointKind, Tree, TreeBody, TreeError};
 /// A value for each joint of a [`Tree`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct Configuration {
-    /// Where the tree's world is: it moves all bodies but those of free joints in the world.
+    /// The pose of the tree's base in the world. It moves all bodies except those with a free joint in the world, and
+    /// the bodies below these.
     pub base: BodyPose,
     /// Each free joint: the pose in the world, or relative to the body's place in its parent, if it has a parent.
     pub free: Vec<BodyPose>,

@@ -151,9 +151,10 @@ fn rounded(value: f64) -> f32 {
 }
 
 impl Tree {
-    /// Frames of these bodies (indices of [`Tree::bodies`]), whose joints `tracks` move. Velocities are those at the
-    /// bodies' origins, or at `points`, one in the frame of each body of the tree, such as its centre of mass. Quaternions
-    /// are `x y z w`, or `w x y z` of [`TreeFrames::with_w_first`].
+    /// Frames of these bodies (indices of [`Tree::bodies`]), whose joints are moved by `tracks`. If `points` is empty,
+    /// velocities are those of the bodies' origins. Otherwise it has a point for each body of the tree, in the body's
+    /// frame, such as the centre of mass, and velocities are those of these points. Quaternions are `x y z w`;
+    /// [`TreeFrames::with_w_first`] changes this to `w x y z`.
     ///
     /// # Errors
     /// When there is not a track for each joint or a point for each body, a body does not exist, or a constant is too

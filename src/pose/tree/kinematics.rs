@@ -128,8 +128,9 @@ impl BodyRows<'_> {
 }
 
 impl Tree {
-    /// Prepares computing these bodies (indices of [`Tree::bodies`]) from many configurations. Velocities are those at the
-    /// bodies' origins, or at `points`, one in the frame of each body of the tree, such as its centre of mass.
+    /// Prepares computing these bodies (indices of [`Tree::bodies`]) from many configurations. If `points` is empty,
+    /// velocities are those of the bodies' origins. Otherwise it has a point for each body of the tree, in the body's
+    /// frame, such as the centre of mass, and velocities are those of these points.
     ///
     /// # Errors
     /// When a body does not exist, or there is not a point for each body.
@@ -196,8 +197,10 @@ impl TreeWalk {
         self.bodies.iter().map(motion).collect()
     }
 
-    /// Computes the bodies of configurations. `at` sets each, by its index, in a state that is that of [`Tree::rest`] or
-    /// that of another configuration. The memory is the tree's ([`Tree::walk_memory`]).
+    /// Computes the bodies of `count` configurations. For each one, `at` is called with its index and with a state, in
+    /// which it stores the values and the rates of this configuration. The state is first that of [`Tree::rest`], then
+    /// what the call before left in it; so set all values that change. `memory` comes from [`Tree::walk_memory`] of the
+    /// same tree.
     ///
     /// The bits are those of [`Tree::motions`].
     ///

@@ -118,7 +118,7 @@ pub struct Mimic {
     pub joint: String,
     /// The factor.
     pub multiplier: f64,
-    /// The value at which the other joint is 0.
+    /// The joint's value when the value of the other joint is 0.
     pub offset: f64,
 }
 
