@@ -96,7 +96,8 @@ impl Origin<'_> {
             return Ok(None);
         }
         let mut kept: Vec<usize> = Vec::with_capacity(times.len());
-        // Whether the last kept key is the second of a jump: the key before it was moved away from the same time.
+        // Whether the last kept key is the second one at its time, so that the key before it was moved to an earlier
+        // time.
         let mut jumps = false;
         for key in 0..times.len() {
             let time = times[key];

@@ -74,7 +74,8 @@ impl JointFrames {
         let mut values = tree.values.iter();
         for body in &tree.bodies {
             let parent = body.parent.map(|parent| bodies[parent]);
-            // The pose of the next frame in the one above, and the origin of that in the axes of the body.
+            // The pose of the next frame relative to the frame above (`offset` and `rest`). `origin` is the origin of
+            // the frame above, in the axes of the body.
             let (mut above, mut offset, mut rest) = (parent.or(base), body.position, body.rotation);
             let mut origin = DVec3::ZERO;
             for (joint, value) in body.joints.iter().zip(&mut values) {

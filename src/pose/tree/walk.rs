@@ -87,7 +87,7 @@ impl WalkScalar {
             (DVec3::Z, WalkAxis::Z),
         ];
         for (coordinate, found) in along {
-            // About an axis in the other direction by the opposite angle.
+            // A rotation about the opposite axis is a rotation about this axis by the opposite angle.
             let sign = axis.dot(coordinate);
             if axis == coordinate * sign && sign.abs() == 1.0 {
                 return Self {
@@ -380,7 +380,7 @@ impl<D: Doubles> Walked<D> {
             let rest = [D::all(x), D::all(y), D::all(z), D::all(w)];
             let rotation = product(self.rotation, rest);
             match frame.motion {
-                // The joint rotates it further.
+                // Not normalised here: below, the joint rotates it further, and then it is normalised.
                 WalkMotion::Hinge(_) | WalkMotion::Ball(_) => self.rotation = rotation,
                 _ => self.rotate(renewed(rotation)),
             }
