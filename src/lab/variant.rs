@@ -1,5 +1,5 @@
-//! The variants of a kernel over spread runs, as data. All give the same bits, so that each is compared with the kernel's
-//! twin. Modules are changed when they are loaded: those that are shipped stay as they are.
+//! The variants of a kernel over spread runs, as data. All give the same bits, so that each is compared with the
+//! kernel's twin. The SPIR-V is changed when it is loaded; the files of the package stay as they are.
 
 use crate::machine::error::VulkanError;
 use crate::output::encoding::Encoding;

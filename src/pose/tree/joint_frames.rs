@@ -1,5 +1,5 @@
-//! A tree as a list of frames, each of which moves by at most one joint in the one above it: what walks along a tree
-//! follow, in f64 ([`TreeWalk`](crate::trees::TreeWalk)) and in f32 ([`TreeFrames`](crate::trees::TreeFrames)).
+//! A tree as a list of frames. Each frame moves in the frame above it, by at most one joint. Walks along a tree follow
+//! this list, in f64 ([`TreeWalk`](crate::trees::TreeWalk)) and in f32 ([`TreeFrames`](crate::trees::TreeFrames)).
 
 use glam::{DQuat, DVec3};
 

@@ -238,7 +238,8 @@ fn unit<D: Doubles>(q: [D; 4]) -> [D; 4] {
     [x * inverse, y * inverse, z * inverse, w * inverse]
 }
 
-/// A product of unit quaternions, normalised by a step of Newton's: rounding does not add up along the tree.
+/// A product of unit quaternions, normalised by a step of Newton's method, so that rounding errors do not add up along
+/// the tree.
 #[inline(always)]
 fn renewed<D: Doubles>(q: [D; 4]) -> [D; 4] {
     let scale = D::all(1.5) - D::all(0.5) * dot(q, q);
