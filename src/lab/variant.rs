@@ -71,12 +71,12 @@ impl KernelVariant {
         Self { stores, ..self }
     }
 
-    /// Whether it is one of the few that have every workgroup and both kinds of stores among them.
+    /// Whether it is one of the few variants that together have every size of workgroups and both kinds of stores.
     pub(super) fn is_typical(self) -> bool {
         (self.stores == StoreCaching::Cached) == (self.workgroup == 64)
     }
 
-    /// The pipelines that it needs beside today's.
+    /// The number of pipelines that it needs in addition to the engine's present ones.
     pub(super) fn new_pipelines(self, today: Self) -> usize {
         usize::from(self.code() != today.code())
     }

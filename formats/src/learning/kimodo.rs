@@ -153,8 +153,8 @@ fn smoothed(targets: &[DVec2], start: &[DVec2]) -> Vec<DVec2> {
     found
 }
 
-/// The matrix `AᵀA + weight`, where a row of `A` is the acceleration at a frame, factored as `L D Lᵀ`. It has two
-/// diagonals beside the main one.
+/// The matrix `AᵀA + weight`, where a row of `A` is the acceleration at a frame, factored as `L D Lᵀ`. Below the main
+/// diagonal, it has two more.
 struct Accelerations {
     weight: f64,
     diagonal: Vec<f64>,

@@ -182,8 +182,8 @@ fn is_unit(key: DQuat) -> bool {
     (dot(key, key) - 1.0).abs() <= 1.9 * UNIT_TOLERANCE
 }
 
-/// The shortest step to a time beside another, in seconds: beside 0, the next f32 is so near that nothing could be
-/// evaluated between both.
+/// The shortest step from one time to the next, in seconds. The next f32 after 0 is so near that nothing could be
+/// evaluated between the two.
 const SHORTEST: f64 = 1e-9;
 
 /// The f32 after `time`.
