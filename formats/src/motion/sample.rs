@@ -356,8 +356,7 @@ impl ChannelMethods {
         }
         let method = |track: usize| self.vector_method(clip.channel(track).of(channel));
         let first_keyed = (0..tracks).find(|&track| is_keyed(track)).unwrap_or(0);
-        // A track without keys gets the method of a track with keys, so that both are evaluated together. The rest pose
-        // then replaces its vectors.
+        // A track without keys goes with others: its vectors are replaced.
         let methods =
             (0..tracks).map(|track| method(if is_keyed(track) { track } else { first_keyed }));
         let methods: Vec<VectorMethod> = methods.collect();
