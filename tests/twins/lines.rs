@@ -549,7 +549,7 @@ fn assert_is_the_cpus(
     assert!(found.len() <= expected.len(), "{:?}", launch.kernel);
     let mut left_out = 0;
     for (i, (found, expected)) in found.iter().zip(expected).enumerate() {
-        // The host stores the others, and where a cubic turns too far.
+        // The host stores the remaining samples, and those of cubics that rotate too far.
         if *found == [UNTOUCHED; 4] || *found == [0; 4] {
             left_out += 1;
         } else {
