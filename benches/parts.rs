@@ -134,7 +134,7 @@ fn frame_of_crowd(bencher: Bencher<'_, '_>, values: CrowdValues, layers: usize, 
         });
 }
 
-/// The instances that a library of motions is asked for together.
+/// The number of instances of one request to a library of motions.
 const INSTANCES: usize = 4096;
 
 /// A library of clips at 30 Hz whose joints rotate and move a little from key to key, with instances at scattered times.

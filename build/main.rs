@@ -1,4 +1,4 @@
-//! Whether the compiled kernels belong to the shaders, and which vectors the engine is compiled for.
+//! Checks that the compiled kernels belong to the shaders, and chooses the vectors for which the engine is compiled.
 
 mod hashes;
 
@@ -9,7 +9,8 @@ fn main() {
     println!("cargo::rerun-if-changed=shaders");
     // Vectors wider than the baseline's: see src/simd/dispatch.rs.
     println!("cargo::rustc-check-cfg=cfg(wide_vectors)");
-    // WebAssembly that is to be as small as can be leaves out second ways to the same bits, which only are faster.
+    // A WebAssembly build for the smallest size leaves out code that is only faster and gives the same bits as other
+    // code.
     println!("cargo::rustc-check-cfg=cfg(smallest)");
     let level = env::var("OPT_LEVEL").unwrap_or_default();
     let target = env::var("CARGO_CFG_TARGET_ARCH").unwrap_or_default();
@@ -22,7 +23,7 @@ fn main() {
     }
     let now = hashes::of_folder(Path::new("."), "shaders")
         .unwrap_or_else(|error| panic!("shaders: {error}"));
-    // Without a list every file is new.
+    // If there is no list, every file counts as changed.
     let list = fs::read_to_string(hashes::LIST).unwrap_or_default();
     let changed = hashes::changed(&list, &now);
     if !changed.is_empty() {

@@ -332,7 +332,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     // Both are kept for all frames: an upload prepares the keys, and costs as much as many frames.
     let engine = renderer.engine()?;
     let clip = engine.upload(&sets[0], method::BESSEL_OVERHAUSER)?;
-    // The first call of a method compiles its kernel, up to a quarter of a second: while a level loads.
+    // The first call with a method compiles its kernel, which takes up to a quarter of a second. So make this call
+    // while a level loads.
     pose(&clip, 0.0, pose_buffer.0)?;
 
     let mut drawn = Vec::new();

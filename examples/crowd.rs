@@ -28,16 +28,16 @@ thread_local! {
 /// Counts what this thread allocates.
 struct Counting;
 
-// SAFETY: all that it does is count, and pass on.
+// SAFETY: each call is passed unchanged to the system's allocator; in addition, allocations are counted.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         ALLOCATIONS.set(ALLOCATIONS.get() + 1);
-        // SAFETY: as promised to this.
+        // SAFETY: the caller's promises are those that the system's allocator needs.
         unsafe { System.alloc(layout) }
     }
 
     unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        // SAFETY: as promised to this.
+        // SAFETY: the caller's promises are those that the system's allocator needs.
         unsafe { System.dealloc(pointer, layout) }
     }
 }
@@ -223,7 +223,8 @@ impl Renderer {
             let types = self
                 .instance
                 .get_physical_device_memory_properties(self.physical_device);
-            // The card's memory, where the host sees it: the other is across the bus.
+            // The card's memory, if the host can access it. Otherwise the host's memory, which kernels write across the
+            // bus.
             let local = required | vk::MemoryPropertyFlags::DEVICE_LOCAL;
             let with = |required| {
                 (0..types.memory_type_count).find(|&index| {
@@ -308,7 +309,7 @@ fn on_device(
             memory,
         });
     }
-    // Kernels are compiled here, while a level loads.
+    // Creating a target compiles its kernels, so a game creates its targets while a level loads.
     let target = |slot: &Slot| -> Result<CrowdTarget, tumble::crowd::CrowdError> {
         let range = VulkanBuffer::new(slot.buffer, size);
         // SAFETY: the buffer is the device's, has memory and this usage, and outlives the target.
@@ -329,7 +330,7 @@ fn on_device(
             let (from, before) = (Instant::now(), ALLOCATIONS.get());
             go_on(&mut crowd, frame)?;
             crowd.record(target, slot.commands)?;
-            // The first frame mostly uploads the layers of all instances.
+            // The first frame does not count, because it also uploads the layers of all instances.
             if frame > 0 {
                 host += from.elapsed();
             }

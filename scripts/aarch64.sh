@@ -1,12 +1,12 @@
 #!/usr/bin/env bash
-# The recorded hashes on aarch64 (NEON), by qemu: the part of scripts/platforms.sh that CI has room for.
-# `--fetch` only fetches what that needs beside qemu: Rust's standard library. The program is linked
-# statically, with the linker that comes with Rust, so no other compiler is needed.
+# Compares the recorded hashes with results on aarch64 (NEON), by qemu. It is the part of scripts/platforms.sh that is
+# short enough for CI. `--fetch` only installs Rust's standard library for aarch64 (qemu must be there already). The
+# program is linked statically, with the linker that comes with Rust, so no other compiler is needed.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 target=aarch64-unknown-linux-musl
 
-# Where something is missing the hashes are not compared, and in CI that is a failure.
+# If something is missing, the hashes are not compared; in CI this is a failure.
 missing() {
     echo "no results of aarch64 were compared: $1" >&2
     [ -z "${CI:-}" ] || exit 1
@@ -25,11 +25,11 @@ rustup target list --installed | grep -qx $target ||
 qemu=$(command -v qemu-aarch64-static || command -v qemu-aarch64) ||
     missing "qemu-aarch64 (Debian: qemu-user-static) is not installed"
 
-# Generating more code than this takes longer than the hashes do.
+# Few optimisations: with more, compiling would take longer than computing the hashes.
 export CARGO_INCREMENTAL=0 CARGO_PROFILE_RELEASE_OPT_LEVEL=1 CARGO_PROFILE_RELEASE_CODEGEN_UNITS=4
 export CARGO_TARGET_AARCH64_UNKNOWN_LINUX_MUSL_LINKER=rust-lld
 export CARGO_TARGET_DIR=$PWD/target/aarch64
-# The versions of everything else.
+# The same versions of crates as in the workspace.
 cp Cargo.lock tests/without_vulkan/Cargo.lock
 cargo build --quiet --release --manifest-path tests/without_vulkan/Cargo.toml --target $target
 "$qemu" "$CARGO_TARGET_DIR/$target/release/without-vulkan" golden

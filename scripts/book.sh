@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Makes target/book, the guide as a book, and looks for links in it that lead nowhere. mdBook is installed
-# into target/tools where this system has none; --no-install says so instead.
+# Makes target/book, the guide as a book, and checks its links. If mdBook is not installed, it is installed into
+# target/tools; with --no-install, only a message is printed.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -13,7 +13,7 @@ if ! command -v mdbook >/dev/null; then
         exit 0
     fi
     echo "installing mdbook $version into $tools" >&2
-    # Without optimisation it is there in half the time, and forty pages take a second either way.
+    # Without optimisation, mdBook is compiled in half the time; the book takes a second in both cases.
     cargo install --quiet --locked --debug --root "$tools" --version "$version" \
         --no-default-features --features search mdbook
 fi

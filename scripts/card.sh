@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Makes target/card/tumble-card.tar.xz: all that proves a card on a bare machine, Debian or Ubuntu (or any
-# other system with as new a glibc), without a network and without anything installed but the card's driver:
+# Makes target/card/tumble-card.tar.xz, an archive that proves a card on a machine with Debian or Ubuntu (or another
+# system with the same or a newer glibc). The machine needs the card's driver, and no network:
 #
 #   tar xf tumble-card.tar.xz && tumble-card/run.sh
 #
@@ -48,7 +48,7 @@ build() {
             fail "$package could not be downloaded; run apt-get update first"
         rm -rf "$place/unpacked"
         dpkg-deb --extract "$place/packages/${package}"_*.deb "$place/unpacked"
-        # The file behind a link is taken by the name that it is asked for by.
+        # The names are links. The files to which they lead are copied under the names of the links.
         local library
         for library in libvulkan.so.1 libVkLayer_khronos_validation.so; do
             find "$place/unpacked" -name "$library" -exec cp --dereference {} "$card/lib/" \;
@@ -62,7 +62,7 @@ build() {
     [ -e "$card/lib/libvulkan.so.1" ] && [ -e "$card/lib/libVkLayer_khronos_validation.so" ] ||
         fail "the packages have other files than were expected"
 
-    # The newest symbols of glibc that anything in it asks for.
+    # The newest version of glibc whose symbols the program or a library in the archive needs.
     local newest=unknown
     if command -v objdump >/dev/null; then
         newest=$(objdump -T "$card/tumble" "$card"/lib/*.so* 2>/dev/null |
@@ -80,7 +80,7 @@ build() {
     echo "$archive: $bytes bytes; it wants glibc $newest or newer"
 }
 
-# A bare Debian: nothing but the base system, and lavapipe in the card's stead.
+# Runs the archive in a Debian that has only the base system, and lavapipe instead of a card.
 try() {
     [ "$(id -u)" -eq 0 ] || fail "--try makes a system of its own, for which it must be root"
     command -v debootstrap >/dev/null || fail "--try needs debootstrap"
@@ -95,7 +95,7 @@ try() {
         chroot "$root" apt-get -qq update
         DEBIAN_FRONTEND=noninteractive chroot "$root" \
             apt-get -qq install --yes --no-install-recommends mesa-vulkan-drivers >/dev/null
-        # The loader must be that of the archive.
+        # Remove Debian's loader, so that the archive's loader is used.
         chroot "$root" dpkg --force-depends --purge libvulkan1 >/dev/null 2>&1 || true
         touch "$root/complete"
     fi
@@ -106,7 +106,7 @@ try() {
     # shellcheck disable=SC2064 # the folder is known now
     trap "umount '$root/proc' 2>/dev/null || true" EXIT
     local outcome=0
-    # No network, where namespaces are allowed: nothing may be fetched.
+    # If namespaces are allowed, run without a network, so that the archive can download nothing.
     local alone=()
     unshare --net true 2>/dev/null && alone=(unshare --net)
     "${alone[@]}" chroot "$root" /root/tumble-card/run.sh "$@" || outcome=$?

@@ -1,21 +1,23 @@
 #!/usr/bin/env bash
-# Tests of all promises about the CPU, on this machine or for another target that cargo has a runner for
-# (`scripts/cpu-tests.sh TARGET`): recorded hashes at every vector width, bit identity between widths, accuracy
-# against the f64 reference, the twins of the shaders, and files that are written and read again. No Vulkan
-# device is asked for, and none is compared: `scripts/test.sh` does that, on Linux.
+# Runs all tests of the CPU, on this machine or for another target for which cargo has a runner (`scripts/cpu-tests.sh
+# TARGET`): recorded hashes at every vector width, bit identity between widths, accuracy against the f64 reference, the
+# twins of the shaders, and files that are written and read again. No Vulkan device is needed or tested;
+# `scripts/test.sh` tests these, on Linux.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 target=()
 [ $# -eq 0 ] || target=(--target "$1")
-# The bash of macOS takes an empty list for an unset one: `${list[@]+"${list[@]}"}`.
-# Where CI is set every test demands a Vulkan device.
+# The bash of macOS treats an empty list as unset, so lists are written `${list[@]+"${list[@]}"}`. If CI is set, every
+# test requires a Vulkan device.
 unset CI
 
-# Tests by Khronos' validator and tests that run the program are left out: they are for the machine itself.
+# Tests with Khronos' validator and tests that run the program are left out, because these programs do not run on the
+# target.
 engine=() parts=() files=(--skip validator)
 case ${1:-} in
 wasm32-*)
-    # There are no drivers, threads, caught panics or temporary folders. The twins of kernels come with Vulkan.
+    # WebAssembly has no drivers, threads, caught panics or temporary folders. The twins of kernels need the feature
+    # `vulkan`.
     engine=(--no-default-features)
     parts=(--skip threads:: --skip gpu::cache::)
     files+=(--skip beneath:: --skip guarded:: --skip output:: --skip path::tests::files_of_paths

@@ -25,7 +25,7 @@ done
     cat LICENSE-MIT LICENSE-APACHE
 } >"$root/usr/share/doc/tumble/copyright"
 gzip -9nc CHANGELOG.md >"$root/usr/share/doc/tumble/changelog.gz"
-# The oldest C library that has all versions of symbols that the program asks for.
+# The oldest version of the C library that has all symbols that the program needs.
 glibc=$(objdump -T "$program" | grep -o 'GLIBC_[0-9.]*' | sed 's/GLIBC_//' | sort -uV | tail -n 1)
 cat >"$root/DEBIAN/control" <<END
 Package: tumble

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Makes a draft of a release of the tag that GITHUB_REF_NAME names, with all files below a folder, by GitHub's
-# own program. The tag has to be the version of Cargo.toml; nothing is published.
+# Makes a draft of a release by GitHub's program `gh`, with all files below a folder. GITHUB_REF_NAME is the tag, which
+# must be the version of Cargo.toml. Nothing is published.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 folder=${1:?the folder with the files}
@@ -16,7 +16,7 @@ while IFS= read -r file; do files+=("$file"); done < <(find "$folder" -type f | 
     echo "there is no file below $folder" >&2
     exit 1
 }
-# One list of checksums of everything, beside those of each file.
+# One list with the checksums of all files, in addition to the separate one of each file.
 sums=$folder/SHA256SUMS
 (cd "$folder" && find . -type f ! -name SHA256SUMS ! -name '*.sha256' -exec sha256sum {} + | sed -E 's|  .*/|  |' | sort -k 2) >"$sums"
 files+=("$sums")

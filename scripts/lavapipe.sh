@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# Installs lavapipe, Mesa's Vulkan driver that computes on the CPU (Debian, Ubuntu), and says where its manifest
-# lies: `VK_DRIVER_FILES` set to it, the loader loads no other driver. In GitHub's actions that is set for the
-# steps that follow.
+# Installs lavapipe, Mesa's Vulkan driver that computes on the CPU (Debian, Ubuntu), and prints the path of its
+# manifest. If `VK_DRIVER_FILES` is this path, the loader loads no other driver. In GitHub's actions, the variable is
+# set for the following steps.
 set -euo pipefail
 
 manifest() {

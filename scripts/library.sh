@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# The C library of this machine's system (Linux), as one archive in target/library, and the archive's SHA-256 beside
-# it: headers for C and C++, the shared library with its SONAME, the static library, files for pkg-config and CMake,
-# an example, the licences. It may be unpacked anywhere.
+# Makes an archive in target/library with the C library for this machine's system (Linux), and a file with its SHA-256.
+# The archive has headers for C and C++, the shared library with its SONAME, the static library, files for pkg-config
+# and CMake, an example, the licences. It may be unpacked anywhere.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 target=${CARGO_TARGET_DIR:-target}

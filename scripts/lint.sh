@@ -1,17 +1,17 @@
 #!/usr/bin/env bash
-# Formatting, lints and documents of every package and every target, without a warning, where rustup's
-# components for them are installed. scripts/test.sh does this first, but for CI.
+# Checks format, lints and documentation of every package and every target; a warning is an error. Parts whose component
+# of rustup is not installed are left out. scripts/test.sh runs this first, except in CI.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-# The oldest Rust that Cargo.toml promises, where it is at hand and not the one in use.
+# The oldest Rust that Cargo.toml promises, if it is installed and is not the one in use.
 oldest=$(sed -n 's/^rust-version = "\(.*\)"/\1/p' Cargo.toml)
 if ! rustc --version | grep -q "^rustc $oldest\b" &&
     command -v rustup >/dev/null && rustup run "$oldest" rustc --version >/dev/null 2>&1; then
     ./scripts/oldest.sh
 fi
 
-# The rules for dependencies (deny.toml), where the tool is installed.
+# The rules for dependencies (deny.toml), if cargo-deny is installed.
 if cargo deny --version >/dev/null 2>&1; then
     cargo deny --log-level error check bans licenses sources
 else
@@ -24,20 +24,20 @@ if cargo clippy --version >/dev/null 2>&1; then
     # No other call compiles the tests that run on demand.
     cargo clippy --workspace --test load --quiet -- -D warnings
 fi
-# The documentation for users, whose links must lead somewhere; then that for authors, with private items.
+# The documentation for users, whose links are checked; then the documentation with private items.
 export RUSTDOCFLAGS="-D warnings"
 rm -rf target/doc
 cargo doc --workspace --no-deps --quiet
 python3 scripts/doc-links.py target/doc
 cargo doc --workspace --no-deps --document-private-items --quiet
 
-# The engine without Vulkan, as an application builds it that wants the CPU alone.
+# The engine without Vulkan, as an application builds it that uses only the CPU.
 CARGO_TARGET_DIR=target/without_vulkan cargo run --quiet --manifest-path tests/without_vulkan/Cargo.toml
 
-# The packages to publish can be packed: versions, licences, files. They are not built once more, because a test
-# (tests/tidy.rs) checks that a package has all files that it includes.
+# Checks that the packages to publish can be packed: versions, licences, files. They are not built again, because a test
+# (tests/tidy.rs) checks that each package has all files that its code includes.
 cargo package --quiet --no-verify --allow-dirty --target-dir target/packages \
     -p tumble -p tumble-exact -p tumble-formats -p tumble-routes -p tumble-verify -p tumble-cli
 
-# The guide as a book, in which every link leads somewhere.
+# The guide as a book, whose links are checked.
 ./scripts/book.sh

@@ -1,10 +1,9 @@
 #!/usr/bin/env bash
-# Mesa's compilers beside the system's, for tests/mesa: Debian 12 has Mesa 22.3, its backports have
-# 25.0, whose RADV compiles for RDNA 4 too, and Debian 13 has NVK, which compiles for NVIDIA's cards.
-# NVK comes with the libraries that it needs, its C library and loader among them. The packages are
-# unpacked into target/mesa and not installed, and apt's own configuration and lists stay as they are.
-# Where this system has no such package, target/mesa/unavailable says why, and the tests compare
-# nothing with it.
+# Unpacks newer versions of Mesa for tests/mesa, in addition to the system's. Debian 12 has Mesa 22.3. Its backports
+# have 25.0, whose RADV also compiles for RDNA 4. Debian 13 has NVK, which compiles for NVIDIA's cards; it is unpacked
+# with all libraries that it needs, even the C library and its loader. The packages are unpacked into target/mesa and
+# not installed; apt's configuration and lists do not change. If this is not possible on this system (it is not Debian
+# 12, for example), target/mesa/unavailable has the reason, and the tests that need these versions compare nothing.
 # MESA_SUITE=sid (or another suite of Debian) unpacks RADV of that suite too, 200 MB with its libraries, into
 # target/mesa/newest.
 set -euo pipefail
@@ -12,7 +11,7 @@ cd "$(dirname "$0")/.."
 
 place=$PWD/target/mesa
 keyring=/usr/share/keyrings/debian-archive-keyring.gpg
-# Whether the newest one was asked for and is not there.
+# Whether MESA_SUITE is set and its Mesa is not unpacked yet.
 is_missing() { [ -n "${MESA_SUITE:-}" ] && ! [ -e "$place/newest/loader" ]; }
 if [ -e "$place/complete" ] && [ -e "$place/nvk/loader" ] && ! is_missing; then
     exit 0
@@ -34,8 +33,8 @@ command -v apt-get >/dev/null && command -v dpkg-deb >/dev/null ||
 
 echo "unpacking a newer Mesa into target/mesa" >&2
 apt="$place/apt"
-# Downloads packages into $apt, by lists of their own: the command (`install` takes what they depend on, too), a suite,
-# what is installed already, and the names.
+# Downloads packages into $apt, by separate lists of packages. Arguments: apt's command (`install` also downloads
+# dependencies), a suite of Debian, the file with the state of installed packages, and the names of the packages.
 download() {
     local command=$1 suite=$2 installed=$3
     shift 3
@@ -48,7 +47,7 @@ download() {
     "${private[@]}" update && (cd "$apt" && "${private[@]}" "$command" "$@") &&
         find "$apt/cache" -name '*.deb' -exec mv -t "$apt" {} +
 }
-# Extracts files from packages in $apt: a folder, then patterns of their names.
+# Extracts files from the packages in $apt. Arguments: a folder, then patterns of file names.
 extract() {
     local folder=$1 package
     shift
@@ -87,8 +86,8 @@ for folder in "$place/nvk" "$place/newest"; do
         (cd "$folder" && ln -s ld-linux* loader)
     fi
 done
-# A name without a folder is that of an installed driver; the loader looks for others beside the
-# manifest.
+# A library that is named without a folder is searched for among the installed ones. With `./`, the loader looks for it
+# next to the manifest.
 for manifest in "$place"/*_icd.json "$place"/n*/*_icd.json; do
     sed -i 's|"libvulkan_|"./libvulkan_|' "$manifest"
 done

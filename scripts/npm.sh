@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Builds the npm package in npm/package and tests it: under Node its bits beside the program's, in Chromium
-# its bits beside Node's. The archive that npm installs comes to lie in target/npm.
+# Builds the npm package in npm/package and tests it: Node's results are compared with the program's, bit for bit, and
+# Chromium's with Node's. The archive that npm installs is in target/npm.
 #
 #   scripts/npm.sh            builds and tests
 #   TUMBLE=PROGRAM scripts/npm.sh   compares with that program
@@ -11,7 +11,7 @@ target=${CARGO_TARGET_DIR:-target}
 name=wasm32-unknown-unknown
 if ! rustup target list --installed | grep -qx $name; then rustup target add $name; fi
 
-# Paths of this machine would be in the messages of panics.
+# Without these flags, messages of panics would contain paths of this machine.
 registry=${CARGO_HOME:-$HOME/.cargo}/registry/src
 # module PROFILE FEATURES: compiles it.
 module() {
@@ -20,7 +20,7 @@ module() {
     built=$target/$name/$1/tumble_npm.wasm
 }
 
-# The hash of the files that decide the module's interface and its bits; a test of the program compares it
+# The hash of the files that determine the module's interface and its results; a test of the program compares it
 # (cli/tests/view_live.rs).
 sources() {
     cat npm/Cargo.toml npm/src/*.rs formats/src/motion/{packed,sample,world}.rs \
@@ -31,7 +31,7 @@ if [ "${1:-}" = --page ]; then
         echo "the engine of pages is made small by wasm-opt and zopfli (Debian's packages binaryen and zopfli)" >&2
         exit 1
     }
-    # Pages bring no files for it to read.
+    # Without the feature `files`, because pages contain no files to read.
     module page ""
     small=$target/$name/page/tumble.wasm
     wasm-opt -Oz --enable-simd --enable-bulk-memory --enable-nontrapping-float-to-int --enable-sign-ext \
@@ -46,7 +46,7 @@ printf 'the module: %s bytes, %s by gzip -9\n' "$(stat -c %s "$built")" "$(gzip 
 cp "$built" npm/package/tumble.wasm
 cp LICENSE-* npm/package
 
-# The program that it is compared with, where none is named.
+# Build the program to compare with, unless TUMBLE names one.
 if [ -z "${TUMBLE:-}" ]; then
     cargo build --quiet -p tumble-cli --bin tumble
     TUMBLE=$(realpath "$target/debug/tumble")
@@ -57,7 +57,7 @@ mkdir -p "$target/npm"
 archives=$(realpath "$target/npm")
 archive=$archives/$(cd npm/package && npm pack --silent --pack-destination "$archives")
 
-# The archive as npm installs it, and its types.
+# Install the archive by npm, and check its types by TypeScript.
 user=$target/npm/user
 mkdir -p "$user"
 printf '{ "private": true, "type": "module" }\n' >"$user/package.json"

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Compiles every package with the oldest Rust that Cargo.toml promises, which rustup fetches where it is missing.
+# Compiles every package with the oldest Rust that Cargo.toml promises. If it is missing, rustup installs it.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 oldest=$(sed -n 's/^rust-version = "\(.*\)"/\1/p' Cargo.toml)

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# The same bits on processors and systems that this machine is not, under emulators. On demand: it takes
-# an hour on two cores, and CI has no room for it. docs/platforms.md has what it found.
+# Compares the bits on other processors and systems, by emulators. It is run on demand, because it takes an hour on two
+# cores, too long for CI. docs/platforms.md has the results.
 #
 #   scripts/platforms.sh                     all parts
 #   scripts/platforms.sh wasm windows        these
@@ -10,18 +10,18 @@
 #   windows   Windows on x86-64, by wine: recorded hashes, the CPU's tests, the program's commands
 #   types     macOS and Android: the engine, its proof, files and routes type-check
 #
-# Each step says what it compared, and the script ends at the first that fails.
+# Each step prints its comparison, and the script stops at the first step that fails.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 root=$PWD
 export CARGO_TARGET_DIR=${TUMBLE_PLATFORMS_DIR:-$root/target/platforms}
 mkdir -p "$CARGO_TARGET_DIR"
-# Less to generate and to link.
+# Settings with which less code is generated and linked.
 export CARGO_INCREMENTAL=0 CARGO_PROFILE_DEV_DEBUG=0 CARGO_PROFILE_RELEASE_CODEGEN_UNITS=16
 
 step() { printf '\n== %s\n' "$*"; }
 
-# Debian's packages, by a program that each brings.
+# Installs missing packages of Debian. The arguments are pairs: a file of a package, and the package.
 packages() {
     local missing=()
     while [ $# -gt 0 ]; do
@@ -40,7 +40,7 @@ packages() {
     DEBIAN_FRONTEND=noninteractive $sudo apt-get install -y -qq --no-install-recommends "${missing[@]}" >/dev/null
 }
 
-# Rust's standard library for a target.
+# Installs Rust's standard library for a target.
 target() {
     command -v rustup >/dev/null || {
         echo "rustup is needed, which has the standard library for $1" >&2
@@ -65,7 +65,7 @@ wasm() {
     packages /usr/bin/node nodejs
     local name=wasm32-wasip1 vectors
     target $name
-    # Without the flag, Node 20 reads a module's memory where it was before it grew, and crashes.
+    # Without the flag, Node 20 crashes after a module's memory has grown, because it reads the old address.
     local node="node --no-warnings --no-turbo-fast-api-calls"
     export CARGO_TARGET_WASM32_WASIP1_RUNNER="$node $root/scripts/platforms/wasi.mjs"
     for vectors in -simd128 +simd128; do
@@ -74,7 +74,7 @@ wasm() {
     done
 }
 
-# Runs a program of Windows'.
+# Runs a Windows program.
 wine() { "$wine" "$@"; }
 
 windows() {

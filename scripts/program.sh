@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# The program `tumble` of this machine's system, stripped, with its licences, as one archive in target/program,
-# and the archive's SHA-256 beside it.
+# Makes an archive in target/program with the program `tumble` for this machine's system, stripped, and its licences,
+# and a file with the SHA-256 of the archive.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 target=${CARGO_TARGET_DIR:-target}
@@ -12,7 +12,7 @@ case $host in
 *windows*) program=tumble.exe ;;
 *) program=tumble ;;
 esac
-# The program starts and prints its version.
+# Check that the program starts and prints its version.
 "$target/release/$program" --version | grep -qF "$version"
 rm -rf "target/program/$name"
 mkdir -p "target/program/$name"

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# The tests of the Python package, in an environment of their own under target/python. The extension
-# is built as the tests' other programs are, so that it shares what they are built of; wheels are
-# built by scripts/wheel.sh. Arguments go to pytest; `--environment` makes the environment and nothing else.
+# Runs the tests of the Python package, in a separate environment in target/python. The extension is built with the same
+# options as the other tests, so that compiled crates are shared; scripts/wheel.sh builds wheels. Arguments are passed
+# to pytest; `--environment` only makes the environment.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -25,11 +25,11 @@ fi
 
 [ "${1:-}" != --environment ] || exit 0
 
-# Naming a test makes cargo choose the features that `cargo test --workspace` has, and nothing is
-# built a second time.
+# The test `cost` is named, so that cargo chooses the same features as for `cargo test --workspace` and builds nothing a
+# second time.
 cargo build --quiet --workspace --lib --test cost
 
-# The package as `pip install` installs it.
+# Copies the package as `pip install` would.
 site=$("$environment/bin/python" -c 'import sysconfig; print(sysconfig.get_path("purelib"))')
 rm -rf "$site/tumble"
 cp -r python/package/tumble "$site/tumble"

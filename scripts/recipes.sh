@@ -1,14 +1,14 @@
 #!/usr/bin/env bash
-# Recipes for conda, Homebrew and vcpkg, in target/recipes: those of packaging with the version, the description and the
-# licence of Cargo.toml, and with the hashes of the archive of the sources, which is made beside them. The flake for Nix
-# (packaging/nix) reads Cargo.toml itself.
+# Makes recipes for conda, Homebrew and vcpkg in target/recipes, from the templates in packaging/. The version, the
+# description and the licence are those of Cargo.toml, the hashes those of the archive of the sources, which is made in
+# the same folder. The flake for Nix (packaging/nix) reads Cargo.toml itself.
 #
 # usage: scripts/recipes.sh [ADDRESS]   the repository's address, from which the release's archive can be loaded
 set -euo pipefail
 cd "$(dirname "$0")/.."
 homepage=${1:-https://example.org/tumble}
 target=${CARGO_TARGET_DIR:-target}
-# The first of the workspace, and those of the program.
+# A field's first value in a Cargo.toml.
 field() { sed -n "s/^$1 = \"\(.*\)\"/\1/p" "$2" | head -n 1; }
 version=$(field version Cargo.toml)
 license=$(field license Cargo.toml)

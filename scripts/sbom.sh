@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# The bill of materials of each published part, as CycloneDX JSON, in a folder [target/sbom]: every crate with its version,
-# licence and checksum, by cargo-cyclonedx, which is installed into target/tools if it is missing.
+# Writes the bill of materials of each published part as CycloneDX JSON into a folder (target/sbom by default): every
+# crate with its version, licence and checksum. If cargo-cyclonedx is missing, it is installed into target/tools.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 folder=${1:-target/sbom}
@@ -12,7 +12,7 @@ fi
 mkdir -p "$folder"
 for part in cli capi python npm; do
     "$tools/bin/cargo-cyclonedx" cyclonedx --format json --override-filename sbom --manifest-path "$part/Cargo.toml"
-    # One file for each crate of the workspace that the part has; its own is what was asked for.
+    # cargo-cyclonedx writes a file for each crate of the workspace that the part uses. Only the part's file is kept.
     mv "$part/sbom.json" "$folder/tumble-$part.cdx.json"
     git clean -qfx -- '*/sbom.json' sbom.json
 done

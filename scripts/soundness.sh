@@ -1,13 +1,13 @@
 #!/usr/bin/env bash
-# Undefined behaviour and data races, looked for where the code has `unsafe` and runs without Vulkan: Miri interprets
-# the vectors, the staging lines, the buffers and the C interface's handles; ThreadSanitizer watches the threads.
-# ufbx, which is C, reads damaged files under gcc's sanitizers, for UFBX_SECONDS (60).
-# Needs Rust's nightly with the components miri and rust-src, and gcc. Parts can be named: miri, threads, ufbx.
+# Looks for undefined behaviour and data races in code that has `unsafe` and runs without Vulkan: Miri interprets the
+# vectors, the staging lines, the buffers and the C interface's handles; ThreadSanitizer observes the threads. ufbx,
+# which is C, reads damaged files with gcc's sanitizers for UFBX_SECONDS (60 by default). Needs Rust's nightly with the
+# components miri and rust-src, and gcc. Parts can be named: miri, threads, ufbx.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
 host=$(rustc -vV | sed -n 's/^host: //p')
-# Interpreting takes a thousand times as long, so properties are tried with few cases.
+# Interpreting takes a thousand times as long, so property tests use few cases.
 export PROPTEST_CASES=${PROPTEST_CASES:-3} CARGO_TARGET_DIR=${CARGO_TARGET_DIR:-target/soundness}
 
 interpreted() { # compiler flags: which vectors the processor has
@@ -27,12 +27,12 @@ miri() {
 
 threads() {
     echo "ThreadSanitizer" >&2
-    # The drivers are not compiled with it, so that it does not see their locks: reports of functions that they call
-    # are suppressed.
+    # The drivers are not compiled with ThreadSanitizer, so it does not see their locks. Therefore reports about
+    # functions that drivers call are suppressed.
     mkdir -p "$CARGO_TARGET_DIR"
     printf 'called_from_lib:%s\n' libvulkan_lvp.so libvk_swiftshader.so >"$CARGO_TARGET_DIR/suppressions"
     export TSAN_OPTIONS="suppressions=$(realpath "$CARGO_TARGET_DIR")/suppressions"
-    # The standard library is compiled too: its locks would not be seen otherwise.
+    # The standard library is compiled with it too; otherwise its locks would not be seen.
     RUSTFLAGS="-Z sanitizer=thread" \
         cargo +nightly test --quiet -Z build-std --target "$host" -p tumble --no-default-features --lib -- \
         threads:: cpu:: output::buffer memory::
@@ -49,7 +49,7 @@ import json, sys
 print(next(p["manifest_path"] for p in json.load(sys.stdin)["packages"] if p["name"] == "ufbx"))')
     sources=$(dirname "$manifest")/ufbx
     mkdir -p "$CARGO_TARGET_DIR"
-    # Without UFBX_UBSAN it shifts by more bits than a word has, as x86-64 defines it and C does not.
+    # Without UFBX_UBSAN, ufbx shifts by more bits than a word has. x86-64 defines this, C does not.
     gcc -O1 -g -DUFBX_UBSAN=1 -fsanitize=address,undefined -fno-sanitize-recover=all -I"$sources" \
         fuzz/c/ufbx.c "$sources/ufbx.c" -lm -o "$CARGO_TARGET_DIR/ufbx"
     "$CARGO_TARGET_DIR/ufbx" "${UFBX_SECONDS:-60}" formats/tests/fixtures/fbx/*.fbx

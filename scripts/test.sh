@@ -1,24 +1,23 @@
 #!/usr/bin/env bash
-# Every test, on this machine as on CI. Installs what the tests need where it is
-# missing: a software Vulkan driver (lavapipe), the validation layer, spirv-val, valgrind,
-# which counts instructions, and chromium, which opens the pages of `tumble view`; Node for Khronos'
-# validator of glTF files, Python with venv for the peers and the Python package, and qemu, which
-# executes aarch64's instructions.
+# Runs every test, on this machine and in CI. Installs the tools of the tests that are missing: a software Vulkan driver
+# (lavapipe), the validation layer, spirv-val, valgrind, which counts instructions, and chromium, which opens the pages
+# of `tumble view`; Node for Khronos' validator of glTF files, Python with venv for the peers and the Python package,
+# and qemu, which executes aarch64's instructions.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-# Instructions are counted of functions as they are shipped; incremental compilation inlines fewer.
+# Tests count the instructions of functions as they are released. Incremental compilation inlines fewer functions, so it
+# is off.
 export CARGO_INCREMENTAL=0
-# Everything is built once from a clean clone: what would make a second build quicker makes the
-# first one slower. Each unit that code is generated in makes the small functions of the others again:
-# four are enough for two cores.
+# CI builds everything once, from a clean clone, so settings that make only a second build faster are off. Each codegen
+# unit compiles small functions of the others again, so there are only four, which are enough for two cores.
 if [ -n "${CI:-}" ]; then
     export CARGO_PROFILE_DEV_DEBUG=0
     export CARGO_PROFILE_DEV_CODEGEN_UNITS=4 CARGO_PROFILE_DEV_BUILD_OVERRIDE_CODEGEN_UNITS=4
     export RUSTFLAGS="${RUSTFLAGS:-} -D warnings"
 fi
 
-# Debian's packages that are missing here.
+# Prints the packages of Debian that are missing here.
 missing_packages() {
     compgen -G '/usr/share/vulkan/icd.d/lvp_icd*.json' >/dev/null || echo mesa-vulkan-drivers
     compgen -G '/usr/share/vulkan/explicit_layer.d/VkLayer_khronos_validation.json' >/dev/null ||
@@ -40,7 +39,7 @@ install_packages() {
     DEBIAN_FRONTEND=noninteractive $sudo apt-get install -y -qq --no-install-recommends "$@" >/dev/null
 }
 
-# Peers to compare with, in an environment of their own (cli/tests/peers).
+# Installs the libraries to compare with, in a separate environment (cli/tests/peers).
 fetch_peers() {
     peers=target/peers
     if ! "$peers/bin/python" -c 'import numpy, scipy, splines, pygeodesic' 2>/dev/null; then
@@ -55,7 +54,7 @@ fetch_peers() {
     fi
 }
 
-# Khronos' validator of glTF files (formats/tests/validator).
+# Installs Khronos' validator of glTF files (formats/tests/validator).
 fetch_validator() {
     validator=target/validator
     package=formats/tests/validator/package.json
@@ -73,8 +72,8 @@ fetch_validator() {
     fi
 }
 
-# Fetches the tools that the tests need, while the workspace is compiled. A newer lavapipe, and AMD's compiler
-# for cards of today (tests/mesa), come with scripts/mesa.sh.
+# Fetches the tools that the tests need, while the workspace is compiled. scripts/mesa.sh unpacks a newer lavapipe and
+# compilers for graphics cards (tests/mesa).
 fetch() {
     [ $# -eq 0 ] || install_packages "$@"
     running=()
@@ -105,31 +104,33 @@ fetch $missing </dev/null &
 fetching=$!
 trap 'wait "$fetching" 2>/dev/null || true' EXIT
 
-# CI checks the format, and makes the compiler's warnings errors. A third of its time would go into the other
-# lints and the documents.
+# CI only checks the format, and treats warnings of the compiler as errors. The other lints and the documentation would
+# take a third of its time.
 if [ -z "${CI:-}" ]; then
     ./scripts/lint.sh
 elif cargo fmt --version >/dev/null 2>&1; then
     cargo fmt --check
 fi
-# The tests and the Python package's extension in one build: two builds in turn would leave a core idle.
+# The tests and the Python package's extension are compiled in one build, because two builds one after another would
+# leave a core idle.
 cargo build --workspace --lib --bins --tests --examples --quiet
 wait "$fetching" || {
     echo "what the tests need could not be fetched: see above" >&2
     exit 1
 }
 
-# SwiftShader, a second and independent driver, comes inside Debian's chromium; where
-# it is there, every test that walks the devices walks it too.
+# SwiftShader is a second, independent driver, which is part of Debian's package chromium. If it is installed, every
+# test of all devices also tests it.
 swiftshader=/usr/lib/chromium/vk_swiftshader_icd.json
 if [ -z "${VK_DRIVER_FILES:-}${VK_ADD_DRIVER_FILES:-}" ] && [ -e "$swiftshader" ]; then
     export VK_ADD_DRIVER_FILES="$swiftshader"
 fi
 
-# Three seconds for each fuzz target, about a quarter for files of each format; ten minutes each are FUZZ_SECONDS=600.
+# Each fuzz target runs for three seconds, files of each format for about a quarter of that. FUZZ_SECONDS=600 is ten
+# minutes each.
 export FUZZ_SECONDS=${FUZZ_SECONDS:-3}
-# The Python package's tests wait for processes more than they compute, and other tests wait for their last
-# one: run beside the engine's tests, they keep both cores busy.
+# The Python package's tests mostly wait for processes, and other tests wait for the last of them. So they run at the
+# same time as the engine's tests, which keeps both cores busy.
 beside=()
 start_beside() { # a file for what it says, a command
     local said=$1
@@ -140,13 +141,13 @@ start_beside() { # a file for what it says, a command
 others() {
     local failed=0
     cargo test --workspace --no-fail-fast --test cost --test fuzz || failed=$?
-    # The log has thousands of lines: the program's messages about each result.
+    # The messages of the program fill thousands of lines, so they are written into a file.
     cargo test --workspace --test options 2>target/options.log || {
         failed=$?
         tail -n 100 target/options.log
     }
     cargo test --workspace --no-fail-fast --doc || failed=$?
-    # Last: while the program's tests wait for each other, a core is free.
+    # This runs last, because a core is free while the program's tests wait for each other.
     ./scripts/aarch64.sh || failed=$?
     return $failed
 }
@@ -159,7 +160,7 @@ for one in "${beside[@]}"; do
     cat "${one#*:}"
 done
 if [ "$failed" -ne 0 ]; then
-    # The end of a log is what people see first.
+    # The failed tests are listed at the end of the log, which people see first.
     echo "these failed (exit $failed):"
     grep -hE "^test .* FAILED|^thread .* panicked at|^error: |test failed, to rerun|^FAILED |^ERROR " \
         target/all.log target/others.log target/python.log || echo "no test: see the log"

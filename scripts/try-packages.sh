@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
-# Installs what library.sh, deb.sh and wheel.sh have made into a bare Debian (by debootstrap, as root), and uses it
-# as a new user would: a C++ program by CMake and by pkg-config, shared and static; the Debian package installed, used and
-# removed; the wheel without a compiler. Not part of test.sh: it needs root, a mirror and minutes.
+# Installs the packages that library.sh, deb.sh and wheel.sh have made into a Debian that has only its base system (by
+# debootstrap, as root), and uses them as a new user would: a C++ program by CMake and by pkg-config, shared and static;
+# the Debian package installed, used and removed; the wheel without a compiler. It is not part of test.sh, because it
+# needs root, a mirror of Debian and some minutes.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 target=${CARGO_TARGET_DIR:-target}

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# The crates of the program that contain `unsafe`, with the number of places, and an error for each that SECURITY.md does
-# not name. Reads the sources that cargo has downloaded.
+# Lists the crates of the program that contain `unsafe`, with the number of places. A crate that SECURITY.md does not
+# name is an error. The sources are those that cargo has downloaded.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 

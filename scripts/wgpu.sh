@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# The package for wgpu: its lints, and its example on lavapipe, which compares every bit. Not part of scripts/test.sh,
-# because wgpu takes minutes to compile.
+# Checks the package for wgpu by its lints, and by its example on lavapipe, which compares every bit. Not part of
+# scripts/test.sh, because wgpu takes minutes to compile.
 #
 #   scripts/wgpu.sh                 the package
 #   scripts/wgpu.sh bevy FILE.glb   also the example for Bevy, which writes target/bevy.png; it needs Rust 1.97

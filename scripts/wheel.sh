@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
-# Builds the wheel of the Python package into target/wheels, by maturin, for the Python that PYTHON
-# names [python3]. One wheel serves every version from 3.10 on; free-threaded Pythons have no stable
-# interface, so that one of them (PYTHON=python3.14t) gets a wheel of its own. On Linux it is linked by zig against
-# glibc 2.28 (Debian 10, RHEL 8, Ubuntu 18.10), whatever this system has, and maturin refuses a wheel that asks for
-# anything newer; GLIBC=system links against this system's.
+# Builds the wheel of the Python package into target/wheels, by maturin, for the Python that PYTHON names [python3]. One
+# wheel serves every version from 3.10 on. Free-threaded Pythons have no stable interface, so each of their versions
+# needs a separate wheel (PYTHON=python3.14t). On Linux, zig links the wheel with glibc 2.28 (Debian 10, RHEL 8, Ubuntu
+# 18.10), whatever this system has, and maturin refuses a wheel that needs a newer one. GLIBC=system links with this
+# system's glibc.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -22,7 +22,7 @@ python=$(command -v "$python")
 glibc=()
 if [ "$(uname)" = Linux ] && [ "${GLIBC:-2.28}" != system ]; then
     glibc=(--zig --compatibility manylinux_2_28)
-    # maturin looks for it there.
+    # maturin looks for zig in PATH.
     PATH=$(cd "$environment" && pwd)/bin:$PATH
 fi
 "$environment/bin/maturin" build --manifest-path python/Cargo.toml --release --strip \

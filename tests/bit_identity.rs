@@ -850,7 +850,7 @@ fn long_tracks_in_stretches_have_the_same_bits() {
             let expected = clip.evaluate(frames).unwrap();
             let found = cpu().evaluate(&set, interpolation, frames).unwrap();
             assert_same_bits(expected.as_quats(), found.as_quats(), method.name);
-            // A device that has not the memory for the whole track.
+            // A device whose memory is too small for the whole track.
             for engine in round_robin(&small, round + request) {
                 let found = engine.evaluate(&set, interpolation, frames).unwrap();
                 assert_same_bits(expected.as_quats(), found.as_quats(), method.name);

@@ -138,7 +138,7 @@ fn tracks_with_the_same_times_have_the_bits_of_the_cpu_frame_by_frame() {
 #[test]
 fn every_device_encodes_like_the_host() {
     let mut set = hostile_set(12, 24);
-    // Turns so small that squares of them, or what rounding takes from the squares, are subnormal.
+    // Rotations so small that their squares, or the rounding errors of the squares, are subnormal.
     for tiny in 40..72 {
         let tiny_rotation = Quat::from_xyzw(-(0.7 * 0.5f32.powi(tiny)), 0.0, 0.0, 1.0);
         let tiny_rotations = [

@@ -111,7 +111,7 @@ fn functions_are_within_their_bounds() {
             x.sqrt(),
             angle_or_zero.atan2(x),
         ];
-        // Units in the last place, or parts of the value, or absolute.
+        // Errors are in units in the last place, relative to the value, or absolute.
         let step = |value: f64| {
             let value = value as f32;
             f64::from(f32::from_bits(value.to_bits() + 1)) - f64::from(value)
@@ -124,7 +124,7 @@ fn functions_are_within_their_bounds() {
     println!("{worst:?}");
     let bounds = [1.2e-7, 1.2e-7, 2.0, 2e-7, 1.0, 2e-7];
     assert!((0..6).all(|i| worst[i] <= bounds[i]), "{worst:?}");
-    // Bounds that are far too wide would say little.
+    // Also require that the bounds are not much wider than the errors; such bounds would say little.
     assert!((0..6).all(|i| worst[i] > bounds[i] / 5.0), "{worst:?}");
     assert_eq!(functions::root(0.0).to_bits(), 0);
     assert_eq!(functions::arc_tangent(0.0, 0.0).to_bits(), 0);

@@ -92,7 +92,8 @@ fn every_float_operation_of_every_shader_is_decorated_once() {
                 results += 1;
             }
         }
-        // Copies of words, whole numbers but for a line, a rounding to halves, and products of rows as vectors.
+        // Some kernels have fewer float operations: they copy words, work on integers, round to halves, or multiply
+        // rows as vectors.
         let least = match name {
             "crowd_gather" | "crowd_scatter" | "motion_store" | "motion_pick" => 0,
             "crowd_half" => 1,

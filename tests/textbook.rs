@@ -346,7 +346,7 @@ fn a_tangent_longer_than_pi_points_forwards() {
     // The principal branch lies a whole turn of 2 pi below.
     let wrapped = expected - 2.0 * TAU / 0.9;
     assert!(wrapped < -4.0, "the case must wrap: {wrapped}");
-    // By how much that would show: the handle's difference, midway.
+    // The effect of a wrong branch: the difference of the handles, at the middle of the interval.
     let difference = (expected - wrapped) * 0.8 / 3.0 * 0.375;
     assert!(difference.to_degrees() > 30.0, "{difference}");
 }

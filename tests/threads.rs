@@ -291,7 +291,7 @@ fn four_hundred_tasks() {
         };
         let tasks = (0..400).into_par_iter();
         tasks.for_each(|task| task_of(&calls, task));
-        // The engine's own threads may call it, too; a lock around a call is not for them.
+        // The engine's own threads may call the engine, too, but not with a lock around the call.
         let (_, unlocked) = calls.split_last().unwrap();
         tumble::on_threads(|| {
             let tasks = (0..100).into_par_iter();
@@ -372,7 +372,7 @@ fn refused_threads() {
     // A small number of threads is granted nevertheless.
     let mut options = EngineOptions::default();
     options.thread_count = Some(2);
-    // The thousand that were begun take a moment to end.
+    // The thousand threads of the refused engine take a moment to end.
     let started = Instant::now();
     let engine = loop {
         match Engine::with_options(Device::Cpu, &options) {

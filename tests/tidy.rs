@@ -92,7 +92,7 @@ fn no_multiply_add_is_fused_and_unsafe_code_has_its_reason() {
                 continue;
             }
             let location = format!("{}:{}", path.display(), i + 1);
-            // A fused one rounds once where the kernels round twice.
+            // A fused multiply-add rounds once, but the kernels round twice.
             assert!(
                 !line.contains("mul_add") && !line.contains("fmadd"),
                 "{location}"
@@ -240,7 +240,7 @@ fn every_shader_function_has_its_twin() {
                 "time_distance",
                 "near_frame",
                 "near_time",
-                // Stores that move bits alone.
+                // Stores that only move bits.
                 "f32",
                 "f32_wide",
                 "wide",

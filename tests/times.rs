@@ -68,7 +68,7 @@ fn any_frames(random: &mut Random, set: &TrackSet) -> SampleTimes {
         0 => any_time(random),
         _ => near(random),
     };
-    // From a handful of frames a track to a handful a key.
+    // With these rates, a track has a few frames, or a key interval has a few.
     let frames = [1u32, 24, 30, 1000, 1_000_000];
     let rate = match random.next() % 3 {
         0 => FrameRate::new(u64::from(random.pick(&frames)), 1001).unwrap(),

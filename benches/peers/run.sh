@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
-# Tumble beside the libraries that people use today, on the same keys, in turns, in one run. It builds what
-# it needs into target/race: the Rust peers for this machine's own vectors (Tumble chooses them when it
-# runs), Python's from PyPI, three.js from npm; missing ones are named under the table.
+# Compares Tumble with the libraries that people use today: the same keys, in turns, in one run. Everything that is
+# needed is built or installed in target/race: the Rust libraries, compiled for this machine's vectors (Tumble chooses
+# its vectors at run time), Python libraries from PyPI, three.js from npm. Libraries that are missing are named under
+# the table.
 #
 #   benches/peers/run.sh                prints the tables of docs/figures.md: many samples a call
 #   benches/peers/run.sh --poses        prints the table of docs/speed.md: one pose of 60 joints a call
@@ -11,7 +12,7 @@
 #   benches/peers/run.sh --program X    with the program X too, called as `X KEYS FOLDER`; it prints a line of
 #                                       JSON for each of its rows, as ozz/src/main.rs does
 #
-# PEERS_PYTHON names a Python that has NumPy, SciPy and other libraries to race (roma and torch).
+# PEERS_PYTHON names a Python that has NumPy, SciPy and other libraries to compare with (roma and torch).
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 

@@ -122,8 +122,8 @@ unsafe fn of_any_version<T: SizedStructure>(
         )));
     }
     let mut structure = MaybeUninit::<T>::zeroed();
-    // SAFETY: the caller's structure has `size` bytes, this one as many or more, and all its members are set: zeros
-    // are valid.
+    // SAFETY: the caller's structure has `size` bytes, and this one has at least as many. The bytes that are not copied
+    // are 0, which is a valid value of every member.
     unsafe {
         let bytes = structure.as_mut_ptr().cast::<u8>();
         pointer.cast::<u8>().copy_to_nonoverlapping(bytes, size);
@@ -182,8 +182,9 @@ pub(crate) unsafe fn sized_list<T: SizedStructure>(
     }
     Ok((0..count).map(move |index| {
         let named = || format!("{name}[{index}].");
-        // SAFETY: the structures before this one have the size of the first, which is that of a version: a multiple of
-        // the alignment.
+        // SAFETY: callers stop at the first error, so all structures before this one have the size of the first, and
+        // the pointer is at a structure of the list. It is aligned, because `of_any_version` has checked that the first
+        // size is a multiple of the alignment.
         let structure = unsafe { of_any_version(pointer.byte_add(index * stride), named)? };
         // SAFETY: as above.
         let size = unsafe { pointer.byte_add(index * stride).cast::<usize>().read() };

@@ -1,4 +1,4 @@
-//! Scalars of sets: numbers over time beside the tracks, such as the angles of a robot's joints.
+//! Scalars of sets: numbers over time in addition to the tracks, such as the angles of a robot's joints.
 
 use std::ffi::c_char;
 use std::sync::PoisonError;

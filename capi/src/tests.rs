@@ -203,7 +203,7 @@ fn zeros_are_the_engines_defaults() {
     assert_eq!(done, TumbleResult::Ok, "{}", words());
     let found: Vec<u32> = output.iter().map(|number| number.to_bits()).collect();
     assert_eq!(found, expected);
-    // Memory that is aligned to nothing but floats.
+    // Memory that is aligned for f32, but not for rotations of 16 bytes.
     let mut all = vec![0.0; expected.len() + 1];
     let done = evaluate(engine, set, &defaults(), &at_60_fps(), &mut all[1..]);
     assert_eq!(done, TumbleResult::Ok);

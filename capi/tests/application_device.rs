@@ -772,7 +772,7 @@ fn clips_are_recorded_into_an_applications_commands() {
         }
     });
     let mut output = [0_u8; 15];
-    // SAFETY: so many bytes.
+    // SAFETY: `output` has as many bytes as are passed.
     let refused =
         unsafe { tumble_request_evaluate(clip, &raw const whole, output.as_mut_ptr().cast(), 15) };
     fails(refused, TumbleResult::WrongSize, "the output has 15 bytes");

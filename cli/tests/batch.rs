@@ -306,7 +306,8 @@ fn resuming_does_not_replace_the_result_of_another_input() {
                 "name their common directory (its tree is kept), or use --base",
             ),
             ("m3/x.txt", "give --names full"),
-            // Its bytes are those of m1/x.dat, which is still there, and whose result may have other options.
+            // It has the bytes of m1/x.dat. That file still exists, and its result may have been made with other
+            // options.
             (
                 "m4/x.dat",
                 "name their common directory (its tree is kept), or use --base",
@@ -542,7 +543,7 @@ fn inputs_that_are_not_found_are_no_success() {
     let work = folder.join("work");
     succeed(&work, &["eval", "in", "-o", "out", "--device", "cpu"]);
     succeed(&work, &["check", "out"]);
-    // From another directory the paths in the manifest are those of no file.
+    // Seen from another directory, the paths in the manifest lead to no files.
     let check = run(folder, &["check", "work/out", "--json"]);
     assert_eq!(check.code, 8, "{}", check.words);
     let expected = "2 input files not found (the first: in/a.dat), so changes in them are not known; run it in the directory \
@@ -559,7 +560,7 @@ fn inputs_that_are_not_found_are_no_success() {
         String::from_utf8(alone.out).unwrap(),
         "2 results, unchanged since they were written\n"
     );
-    // A directory of its name is no input.
+    // A directory with the name of an input does not count as the input.
     let input = work.join("in/a.dat");
     fs::remove_file(&input).unwrap();
     fs::create_dir(&input).unwrap();

@@ -428,7 +428,8 @@ fn an_acceleration_that_jumps_is_warned_of() {
         let text = output.words + &String::from_utf8(output.out).unwrap();
         assert_eq!(text.matches("W014").count(), 1, "{line:?}: {text}");
         assert!(text.contains(said), "{line:?}: {text}");
-        // The same keys with intervals of a hundred to one have their curve, and other methods have no warning.
+        // The same keys have a c2 curve if their intervals differ only by a factor of a hundred; other methods never
+        // have this warning.
         let even: Vec<&str> = line
             .iter()
             .map(|word| {

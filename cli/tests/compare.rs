@@ -76,7 +76,7 @@ fn a_motion_and_what_was_made_of_it() {
         "0",
     ];
     succeed(folder, &second);
-    // At other samples the largest is another one: half a frame from the key it is less.
+    // At other samples the largest difference is smaller, because the nearest sample is half a frame from the key.
     let fps = ["--fps", "4", "--start", "0.25", "--json"];
     let line = [&["compare", "a.dat", "turned.dat"][..], &fps].concat();
     let (_, found) = json(folder, &line);
@@ -835,7 +835,7 @@ fn joints_are_listed_worst_first() {
     assert_eq!(rows[0][..4], ["first", "second", "joint", "rotation_mean"]);
     assert_eq!((rows.len(), rows[1][2], rows[1][7]), (3, "knee", "30"));
 
-    // Joints without a difference are not among those that are not listed.
+    // The number of joints that are not listed does not count joints without a difference.
     walk(folder, "both.bvh", 7.0);
     let bent = std::fs::read_to_string(folder.join("both.bvh")).unwrap();
     let changed = bent.replace(" 5 0 ", " 6 0 ");
@@ -1118,7 +1118,7 @@ fn directories_are_compared_file_by_file() {
     let failed = run(folder, &[&line[..], &["--tolerance", "1deg"]].concat());
     let expected = "they differ: 1 pair over the limit, 2 files in only one of the directories";
     assert!(failed.words.contains(expected), "{}", failed.words);
-    // A result that is cut to half of its length is no equal.
+    // A result that is cut to half of its length counts as different.
     write("short/same.dat", "# 1 1\n0 1 0 0 0\n2 1 0 0 0\n");
     write("whole/same.dat", "# 1 1\n0 1 0 0 0\n4 1 0 0 0\n");
     let (code, found) = json(
@@ -1131,7 +1131,7 @@ fn directories_are_compared_file_by_file() {
     );
     let report = String::from_utf8(succeed(folder, &["compare", "short", "whole"]).out).unwrap();
     assert!(report.contains("same.dat: 2 s in only one\n"), "{report}");
-    // A number that is none in one of them has no difference.
+    // If a number is NaN in one of the files, it has no difference.
     for (side, number) in [("nan", f32::NAN), ("number", 1.5)] {
         let header = "{'descr': '<f4', 'fortran_order': False, 'shape': (2,), }";
         let mut bytes = b"\x93NUMPY\x01\x00\x76\x00".to_vec();
@@ -1290,7 +1290,7 @@ fn directories_are_refused_for_the_right_reason() {
         "{}",
         empty.words
     );
-    // A clip of tracks beside one of scalars has nothing to compare.
+    // A clip of tracks and a clip of scalars have nothing to compare.
     for files in [["a.dat", "da/x.csv"], ["da/x.csv", "a.dat"]] {
         let found = run(folder, &[&["compare"][..], &files].concat());
         let expected = "error: da/x.csv has only scalars, and none of them has the name of a scalar of a.dat\n";

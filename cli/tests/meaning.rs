@@ -121,7 +121,7 @@ fn an_order_of_joints_that_nothing_shows_is_said() {
         &format!("{eval} stated.npz --source-body-order depth-first"),
     );
     assert!(!made.words.contains("W906"), "{}", made.words);
-    // Angles of degrees, which a robot of radians cannot have.
+    // Angles in degrees, which exceed the limits of joints if they are read as radians.
     let degrees = take().lines().fold(String::new(), |mut text, line| {
         let cells: Vec<f64> = line.split(',').map(|cell| cell.parse().unwrap()).collect();
         let cells = cells.iter().enumerate().map(|(index, cell)| match index {
@@ -375,7 +375,7 @@ fn a_dry_run_names_what_failed_before() {
         text.contains("1 result would be made (1 of inputs that failed in the last run)"),
         "{text}"
     );
-    // An input that cannot be read any more has a result of other bytes.
+    // If an input cannot be read any more, its result belongs to other bytes of the input.
     fs::write(folder.join("in/a.dat"), "# 2 3\n0 1 0 0\n").unwrap();
     let again = run(folder, &words("eval in -o out --resume --device cpu"));
     says(

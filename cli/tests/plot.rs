@@ -435,7 +435,7 @@ fn png_shows_the_same_picture() {
     let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
     let info = reader.next_frame(&mut pixels).unwrap();
     let marks = plot(folder.path(), &["-m", "slerp", "--dimension", "4"]);
-    // In the middle of a key's dot is the key's colour; two pixels for each of SVG's.
+    // The middle of a key's dot has the key's colour. The picture has two pixels for each pixel of the SVG.
     for &(x, y) in &marks.dots {
         let (x, y) = ((x / FINER * 2.0) as usize, (y / FINER * 2.0) as usize);
         let at = (y * info.width as usize + x) * 3;

@@ -299,7 +299,7 @@ fn the_schema_refuses_what_it_does_not_describe() {
     }
 }
 
-// ---------------------------------------------------------------- the devices that were had
+// ---------------------------------------------------------------- the devices that were available
 
 /// The files of `proofs/`, in the order of their names.
 fn proofs() -> Vec<std::path::PathBuf> {

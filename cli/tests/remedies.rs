@@ -85,7 +85,7 @@ const REMEDIES: &[(&str, &str, &[&str])] = &[
             "eval twice.tum --duplicates both -o o.npy",
         ],
     ),
-    // Times that f32 cannot tell apart (E182), in a new file and in one that is kept.
+    // Times that are equal in f32 (E182), in a new file and in a file that is written again.
     (
         "eval late.dat --fps 60 -o o.glb",
         "give --fps 16 or less",

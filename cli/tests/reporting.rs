@@ -144,12 +144,12 @@ fn a_dry_run_names_the_results_that_the_batch_then_makes_skips_and_removes() {
         states,
         ["kept", "planned", "planned", "kept", "kept", "pruned"]
     );
-    // The batch does what was said.
+    // The batch does what the dry run has announced.
     let done = run_of("eval in -o out --resume --prune");
     let summary = "2 results made, 3 results of 2 inputs kept (already complete)";
     assert!(done.words.contains(summary), "{}", done.words);
     assert!(!folder.join("out/b.npy").exists() && folder.join("out/d.npy").exists());
-    // The reason is the one that applies.
+    // The dry run names the reason why an input is evaluated again.
     let reason = |line: &str| {
         let dry = run_of(line);
         text(&dry).lines().next().unwrap().to_owned()

@@ -119,7 +119,7 @@ fn missing_shards_are_named_and_made() {
     let other = run(folder, &["eval", "a.dat", "-o", "out/", "--resume"]);
     assert_eq!(other.code, 2, "{}", other.words);
 
-    // One process ends what shards have begun.
+    // One process can finish a batch that shards have begun.
     fs::write(folder.join("out/01.npy"), "a lost worker's").unwrap();
     let resumed = succeed(folder, &["eval", "walks", "-o", "out", "--resume"]);
     assert!(
@@ -162,7 +162,7 @@ fn a_lost_plan_is_named_and_written_again() {
     assert_eq!(fs::read(&plan).unwrap(), before);
     succeed(folder, &["merge", "out"]);
     assert_eq!(tree(&folder.join("out")), tree(&folder.join("one")));
-    // The file of a shard may be lost, too; and the plan may be cut, which says what to do.
+    // The file of a shard may be lost, too. If the plan was cut, the message says what to do.
     for is_cut in [false, true] {
         let out = if is_cut { "cut" } else { "lost" };
         let plan = folder.join(out).join("manifest.d/plan.json");
@@ -410,7 +410,7 @@ fn killed_shards_are_made_again() {
         if is_running {
             kills += 1;
         } else {
-            // It was done before the kill came: there is nothing left to resume.
+            // The process ended before it was killed, so there is nothing left to resume.
             fs::remove_dir_all(folder.join(&out)).unwrap();
         }
         if kills == 12 {

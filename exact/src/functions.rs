@@ -57,7 +57,7 @@ pub fn magnitude(x: f32) -> f32 {
     generated::magnitude(x)
 }
 
-/// The numbers of the generated functions. The engine has vectors of numbers beside f32.
+/// The numbers of the generated functions. The engine also uses vectors of numbers, in addition to f32.
 pub(crate) trait Number:
     Copy + std::ops::Add<Output = Self> + std::ops::Sub<Output = Self> + std::ops::Mul<Output = Self>
 {

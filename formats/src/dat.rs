@@ -310,7 +310,7 @@ impl DatKeys {
             );
             lines.warn(column, Code::NormOff, message);
         }
-        // Small rotations with w last: the last number is near 1, the first near 0.
+        // Counts keys that look like small rotations with w last: their last number is near 1 and their first near 0.
         self.total += 1;
         if key.z.abs() > 0.9 && key.w.abs() < 0.3 {
             self.w_last += 1;

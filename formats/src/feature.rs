@@ -21,7 +21,7 @@ pub enum Feature {
     Translations,
     /// Scales.
     Scales,
-    /// Scalars: numbers over time beside the tracks, such as the angles of a robot's joints.
+    /// Scalars: numbers over time in addition to the tracks, such as the angles of a robot's joints.
     Scalars,
     /// The smallest and the largest value of scalars that joints allow.
     Limits,

@@ -31,8 +31,9 @@ pub(crate) fn unique_name(mut name: String, index: usize, used: &mut HashSet<Str
     name
 }
 
-/// The first two tracks that have one name beside each other, under one parent, or that had one until a reader appended
-/// a number to the second ([`unique_name`]). `parents` has the parent of each track; it is empty if there are none.
+/// The first two tracks that are siblings (have one parent) and have the same name, or that had one until a reader
+/// appended a number to the second ([`unique_name`]). `parents` has the parent of each track; it is empty if there are
+/// none.
 pub(crate) fn same_named(names: &[String], parents: &[Option<usize>]) -> Option<[usize; 2]> {
     let known: HashSet<&str> = names.iter().map(String::as_str).collect();
     let stated = |mut name: &str| {

@@ -1,4 +1,4 @@
-//! Bodies of SMPL, whose joints a model places: a made model, beside NumPy's numbers.
+//! Bodies of SMPL, whose joints a model places: a generated model, compared with NumPy's numbers.
 
 use std::path::{Path, PathBuf};
 

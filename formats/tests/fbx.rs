@@ -1,5 +1,5 @@
-//! FBX as it is read: files of Maya, 3ds Max, `MotionBuilder` and Blender, beside the numbers of Autodesk's
-//! SDK and beside `ufbx` itself; and made ones.
+//! Reading FBX: files of Maya, 3ds Max, `MotionBuilder` and Blender are compared with the numbers of Autodesk's SDK and
+//! with `ufbx` itself; other files are generated.
 
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -495,7 +495,8 @@ fn names_of_joints_are_never_lost_silently() {
         "{refused}"
     );
 
-    // `numpy.str_`, as `numpy.array(list(names), dtype=object)` of an array of texts has them.
+    // Elements of the type `numpy.str_`, as in `numpy.array(list(names), dtype=object)` if `names` is an array of
+    // texts.
     let numpy_text = |text: &str| {
         let words: String = text
             .chars()

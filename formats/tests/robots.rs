@@ -366,7 +366,7 @@ fn bodies_of_mjcf_are_where_mujoco_has_them() {
             "{file}: {largest:?}"
         );
         check_orders(tree, &mut arrays);
-        // A row of the file itself: its joints at their references.
+        // The first row is the rest position of the robot's file: all joints are at their reference values.
         let rest = at_qpos(tree, &qpos[0], &qvel[0]).0;
         assert_eq!(rest.scalars, tree.rest().scalars);
         for (joint, range) in tree.joints().zip(arrays.rows("joint_ranges")) {
@@ -709,7 +709,7 @@ fn large_and_deep_files_end_soon() {
     for (text, code) in refused {
         assert_eq!(read(&text, &[]).unwrap_err().code, code);
     }
-    // None of these may take more than seconds, however much it is.
+    // Reading these files takes at most seconds, although they are large.
     let many: String = (0..60_000)
         .map(|i| format!("<body name='b{i}'/>"))
         .collect();

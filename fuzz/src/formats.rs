@@ -56,7 +56,7 @@ pub(crate) fn format(format: &Format, bytes: &[u8]) -> u64 {
     signature((codes, loaded.clips.len().min(3), first))
 }
 
-/// The options that a format takes, of which the length of the file chooses some.
+/// Some of the options that a format takes, chosen by the length of the file.
 fn options(format: &Format, length: usize) -> ReadOptions {
     let takes = |option, is_chosen| is_chosen && format.takes(option);
     let maps = [

@@ -16,7 +16,7 @@ pub fn target(name: &str, data: &[u8]) {
         "surfaces" => targets::surfaces::surfaces,
         "paths" => targets::surfaces::paths,
         "numbers" => targets::surfaces::numbers,
-        // The root element says which it is; each has a corpus.
+        // The root element distinguishes the two formats; each has a separate corpus.
         "mjcf" | "urdf" => targets::robots::robot,
         _ => panic!("there is no target {name}"),
     };

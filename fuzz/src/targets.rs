@@ -291,7 +291,7 @@ pub(crate) fn tracks(bytes: &[u8]) -> u64 {
         interpolation.signs = KeySigns::AsAuthored;
     }
     if choice >= 250 {
-        // Slow: most inputs go without.
+        // Constant speed is slow, so only some inputs have it.
         interpolation.speed = Speed::Constant;
     }
     let outside = [

@@ -91,7 +91,7 @@ impl VertexInserter<'_> {
         let largest = corners
             .iter()
             .fold(0.0, |max: f64, c| max.max(c.abs().max_element()));
-        // Far from the origin, positions are rounded by more than that.
+        // Far from the origin, the rounding of positions exceeds `ON_EDGE`.
         let least = ON_EDGE.max(4.0 * f64::EPSILON * largest / longest);
         let inside: Vec<usize> = (0..3).filter(|&k| at.weights[k] > least).collect();
         let face = self.surface.faces[at.face];

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# Proves the card of this machine: which devices there are, that they give the CPU's bits, that the validation
-# layer has nothing to say, how fast they are, and what would be faster. It takes at most twelve minutes, needs no network, and leaves
-# everything in one folder beside it, with a summary.
+# Proves the card of this machine: lists the devices, compares their bits with the CPU's, runs the validation layer, and
+# measures their speed and that of other variants of the kernels. It takes at most twelve minutes and needs no network.
+# All results and a summary are in one folder next to this file.
 #
 #   ./run.sh                      the first Vulkan device
 #   ./run.sh --device NAME        another: index, part of the name or uuid:UUID
@@ -11,7 +11,7 @@ set -u
 here=$(cd "$(dirname "$0")" && pwd)
 cd "$here" || exit 1
 
-# Seconds of each step: allowed by the program, and after which it is ended.
+# For each step in seconds: the program's time limit, and the time after which the step is killed.
 prove_seconds=190 prove_limit=215
 validate_seconds=70 validate_limit=110
 lab_seconds=150 lab_limit=190 chosen_seconds=40 chosen_limit=60
@@ -31,14 +31,14 @@ while [ $# -gt 0 ]; do
     esac
 done
 
-# Where this folder cannot be written, the results go where they can.
+# If this folder cannot be written, the results are written into a temporary folder.
 name="results-$(uname -n)-$(date -u +%Y%m%d-%H%M%S)"
 results=$here/$name
 mkdir "$results" 2>/dev/null || results=$(mktemp -d)/$name && mkdir -p "$results" || exit 1
 summary=$results/summary.txt
 say() { echo "$*" | tee -a "$summary"; }
 
-# The system's loader, which other programs use here, if there is one; else Debian's.
+# Use the system's Vulkan loader if there is one, as other programs here do; otherwise the archive's.
 if ! (PATH=$PATH:/sbin:/usr/sbin ldconfig -p 2>/dev/null | grep -q 'libvulkan\.so\.1'); then
     export LD_LIBRARY_PATH=$here/lib${LD_LIBRARY_PATH:+:$LD_LIBRARY_PATH}
     loader="the loader of this archive"
@@ -46,8 +46,8 @@ else
     loader="the system's loader"
 fi
 export VK_LAYER_PATH=$here/layers
-# Nothing is known from before, and nothing is left behind: the drivers' compiled kernels are kept for the next engine
-# in a folder that is deleted at the end.
+# The run uses no caches of earlier runs and leaves none. Only during the run, the drivers' compiled kernels are kept in
+# a temporary folder.
 caches=$(mktemp -d) || exit 1
 trap 'rm -rf "$caches"' EXIT
 export TUMBLE_CACHE_DIR="" MESA_SHADER_CACHE_DIR=$caches __GL_SHADER_DISK_CACHE_PATH=$caches
@@ -59,11 +59,11 @@ manifest() {
         "$1" >"$file"
     echo "$file"
 }
-# Loaders before 1.3.207 know the older name alone.
+# Loaders before 1.3.207 know only the older name, VK_ICD_FILENAMES.
 use() { export VK_DRIVER_FILES=$1 VK_ICD_FILENAMES=$1; }
 sees_devices() { timeout -k 5 "$devices_limit" ./tumble devices 2>/dev/null | grep -q '^0  '; }
 
-# Containers often have NVIDIA's library and no manifest; where there is no X, only the one for EGL loads.
+# Containers often have NVIDIA's library but no manifest. Without X, only the library for EGL can be loaded.
 find_nvidia() {
     local folder library
     for library in libGLX_nvidia.so.0 libEGL_nvidia.so.0; do
@@ -115,7 +115,8 @@ say "$loader; $chosen"
     command -v nvidia-smi >/dev/null && timeout 20 nvidia-smi -q
 } >"$results/environment.txt" 2>&1
 
-# A step: its name, its limit, the command. Its output goes into files; its last line into the summary.
+# Runs a step; the arguments are its name, its time limit and the command. The output is written into files, the outcome
+# into the summary.
 worst=0
 step() {
     local name=$1 limit=$2 started=$SECONDS code=0 outcome
@@ -149,5 +150,5 @@ done
 tar --create --gzip --directory "$(dirname "$results")" --file "$results.tar.gz" "$(basename "$results")" \
     2>/dev/null && echo "all of it: $results.tar.gz"
 echo "the summary: $summary"
-# Speed proves nothing.
+# The exit code is that of the proofs; later steps only measure speed.
 exit "$proved"

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# The program's main commands on Windows, by wine, and on Linux: the same files, byte for byte
-# (`scripts/platforms.sh windows` builds both and calls this). Paths are Windows', with drives and `\`.
+# Runs the program's main commands on Windows, by wine, and on Linux, and requires that they write the same bytes
+# (`scripts/platforms.sh windows` builds both and calls this). Paths are those of Windows, with drives and `\`.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 root=$PWD
@@ -10,7 +10,7 @@ trap 'rm -rf "$work"' EXIT
 cd "$work"
 compared=0
 
-# Linux' paths are on the drive Z.
+# In wine, Linux' files are on the drive Z.
 at() { printf 'Z:%s' "$1" | tr / '\\'; }
 linux() { "$TUMBLE_LINUX" "$@"; }
 windows() { "$WINE" "$TUMBLE_WINDOWS" "$@"; }
@@ -36,7 +36,7 @@ windows eval "$(at "$root/data/pendulum.dat")" -o "$(at "$long/größe.npy")"
 same linux.npy "$long/größe.npy"
 
 echo "convert, to a binary format and to text and back"
-# Files say what they were made of, as it was called.
+# The input has the same name in both calls, because written files contain the name of their input.
 cp "$root/data/pendulum.dat" .
 linux convert pendulum.dat -o linux.glb
 windows convert pendulum.dat -o out.glb
@@ -97,7 +97,7 @@ echo "Ctrl-C while a file is written leaves none"
 x86_64-w64-mingw32-gcc -O1 -o ctrl-c.exe "$root/scripts/platforms/ctrl-c.c"
 mkdir pressed
 failed=0
-# Wine has a console where there is a terminal, of which `script` makes one.
+# Wine provides a console only in a terminal, so `script` creates a terminal.
 cat >press.sh <<END
 cd pressed
 "$WINE" ../ctrl-c.exe .tumble- '$(at "$TUMBLE_WINDOWS")' eval '..\library\clip1.dat' --fps 40000 -o never.npy

@@ -1,5 +1,5 @@
-//! The segments of a group, as the CPU's loops read them: alike in a list, or packed, where each is evaluated by the loop
-//! of its degree.
+//! The segments of a group in the two forms that the CPU's loops read: a list of whole segments, or packed segments,
+//! each of which is evaluated by the loop for its degree.
 
 use crate::cpu::evaluate::distances;
 use crate::cpu::streaming::Samples;

@@ -115,7 +115,7 @@ fn each_span<'d>(
             let to = frames.boundary(end);
             from = to;
             let key = prepared.spans.keys[index];
-            // An interval that was cut has several spans, of which the first has its key.
+            // An interval that was cut has several spans. Only the first one has the interval's key.
             let number = key_index;
             key_index += u32::from(key != NONE);
             if start.first >= to.first || start.first > last_tick {

@@ -71,7 +71,8 @@ impl Passages {
             }
         };
         let position = clip_position(entry, clock, 0);
-        // Whole ticks: forwards the position reaches a tick at its beginning, and backwards at its end.
+        // A tick is 2^16 units of the position. Forwards, the position reaches a tick at the first of these units,
+        // backwards at the last one.
         let (position, end_of_tick) = match backwards {
             true => (-position, 0xffff),
             false => (position, 0),

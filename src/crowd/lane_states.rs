@@ -1,6 +1,7 @@
-//! States of as many instances as a vector has lanes, joint by joint: the keys or constants of a joint are gathered from the
-//! clips of all of these instances, so that no lane is idle, whatever the number of joints. The bits are those of any other
-//! group. The numbers of all joints of a group stay in vectors from the keys to the results.
+//! States of as many instances as a vector has lanes, joint by joint: the keys or constants of a joint are gathered
+//! from the clips of all of these instances, so that no lane is idle, whatever the number of joints. The bits do not
+//! depend on which instances share a group. The numbers of all joints of a group stay in vectors from the keys to the
+//! results.
 
 use crate::crowd::clip_keys::{next, unpacked};
 use crate::crowd::states::{

@@ -214,7 +214,7 @@ mod tests {
     struct LayOverCase {
         joints: usize,
         random: fastrand::Rng,
-        /// How often rotations that are as far apart as can be were met.
+        /// The number of pairs of rotations half a turn apart so far.
         opposite: usize,
     }
 

@@ -132,7 +132,7 @@ fn walk_to<L: Lanes>(
     let axes = product(above, rest);
     let mut arm = rotated(above, all3(frame.offset));
     let mut rotation = axes;
-    // Its velocities about and along `axes`.
+    // The joint's linear and angular velocity, in `axes`.
     let (mut linear, mut angular) = ([zero; 3], [zero; 3]);
     match frame.kind {
         FRAME_FIXED => {}
@@ -166,7 +166,7 @@ fn walk_to<L: Lanes>(
             }
         }
     }
-    // One step of Newton's: rounding does not add up along the tree.
+    // One step of Newton's method normalises the rotation, so that rounding errors do not add up along the tree.
     let scale = L::all(1.5) - L::all(0.5) * dot(rotation, rotation);
     let [x, y, z, w] = rotation;
     let from_root = canonical3(sum(parent.from_root, arm));

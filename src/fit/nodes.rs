@@ -180,8 +180,8 @@ impl<L: Lanes, const PAIRS: usize> NodeSamples<L, PAIRS> {
     /// that the divided differences of [`Nodes::powers`] need there.
     #[inline(always)]
     pub(crate) fn set_slopes(&mut self, before: [L; 4], after: [L; 4]) {
-        // At s = 1/2 the polynomials even / 2s² and odd / 2s have the values 2 even and odd, and
-        // the derivatives by s² 2 (after - before) - 8 even and after + before - 2 odd.
+        // At s = 1/2, `even / 2s²` has the value `2 even`, and its derivative by s² is `2 (after - before) - 8 even`.
+        // `odd / 2s` has the value `odd`, and its derivative by s² is `after + before - 2 odd`.
         for c in 0..4 {
             let (even, odd) = (self.even[PAIRS - 2][c], self.odd[PAIRS - 2][c]);
             self.even[PAIRS - 1][c] = (after[c] - before[c]) - L::all(3.0) * even;

@@ -155,7 +155,8 @@ impl TwoKeyBlock {
 
     pub(super) fn flush(&mut self, output: &mut OutputIter<'_>) {
         in_lanes(self);
-        // `zip` takes from the output second: first, it would lose an element when rotations end.
+        // The output is the second iterator of `zip`. As the first one, it would lose an element when the rotations
+        // end.
         for (&rotation, value) in self.rotations[..self.count].iter().zip(output) {
             *value = rotation;
         }

@@ -1,4 +1,4 @@
-//! One buffer.
+//! A Vulkan buffer with its memory, mapped for the host, imported or exported.
 
 use std::ops::Range;
 use std::ptr::NonNull;

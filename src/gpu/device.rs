@@ -100,8 +100,8 @@ impl LogicalDevice {
             Some(other) => vec![of_family(family, 1), of_family(other.family, 1)],
             None => vec![of_family(family, 1)],
         };
-        // Memory is imported on software devices only. They work in threads of this process: a
-        // wait for them ends, and afterwards none of them touches memory that its owner may free.
+        // Memory is imported on software devices only. They compute in threads of this process, so waiting for their
+        // work always ends. After that, no thread uses the memory, and its owner may free it.
         let reads_texels = physical.reads_texels(options.reads);
         let borrows = physical.info.kind == DeviceKind::Cpu
             && physical.lent_alignment.is_some()

@@ -269,8 +269,8 @@ impl<'a> ImportedMemory<'a> {
         let (size, start) = (bytes.len(), bytes.as_ptr().addr() % PAGE);
         let alignment = device.physical.info.min_storage_buffer_offset_alignment as usize;
         let is_aligned = |offset: usize| offset.is_multiple_of(alignment.max(1));
-        // A binding begins at an aligned offset, a whole number of values before the result:
-        // either every value is aligned, or the start of the page is such an offset.
+        // A binding must begin at an aligned offset and a whole number of values before the result. Either the offset
+        // of every value is aligned, or the start of the page is a whole number of values before the result.
         let binds = is_aligned(start) && is_aligned(each) || start.is_multiple_of(each);
         let imported = binds.then(|| Self::new(device, NonNull::from(&mut *bytes).cast(), size));
         imported.flatten().ok_or(bytes)

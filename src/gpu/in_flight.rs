@@ -1,6 +1,6 @@
 //! Work in flight: the host starts a piece of it while the device works on the previous ones, copies their results to
-//! the host, and applies the rotations that the host computed. Results are read where kernels wrote them, or are
-//! copied from device memory by the kernels' submission or by another one beside later kernels.
+//! the host, and applies the rotations that the host computed. Results are read where kernels wrote them, or are copied
+//! from device memory: by the kernels' submission, or by another one while later kernels run.
 
 use std::ops::Range;
 use std::sync::Arc;

@@ -1,4 +1,4 @@
-//! A Vulkan device as a machine.
+//! The trait `Machine` for a Vulkan device.
 
 use std::sync::Arc;
 

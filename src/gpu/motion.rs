@@ -342,8 +342,8 @@ impl ResidentMotions {
             let last = count.min(first + window);
             self.submit(work, (&shape, ranges), first..last, target)?;
             let is_waited_for = match target {
-                // The readers of an exported result wait for its semaphore. Only the last window may be left to them:
-                // the others reuse the same buffers.
+                // The readers of an exported result wait for its semaphore, so the last window need not be waited for
+                // here. The windows before it must be, because the next one reuses their buffers.
                 StatesTarget::Exported(exported) => last < count || !exported.has_timeline(),
                 StatesTarget::InPlace(_) | StatesTarget::Copied(_) => true,
             };

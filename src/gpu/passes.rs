@@ -1,4 +1,5 @@
-//! Passes over poses on a device: of the host, and recorded from buffers of an application into another of its buffers.
+//! Passes over poses on a device: over data of the host, and recorded into an application's commands, from its buffers
+//! to another of its buffers.
 
 use std::sync::Arc;
 

@@ -487,7 +487,7 @@ impl Drop for DescriptorPool {
 mod tests {
     use super::*;
 
-    /// Memory that a pass or a crowd has of its own was used by its own kernels and copies.
+    /// Memory that belongs to a pass or to a crowd alone was used by its kernels and copies only.
     #[test]
     fn earlier_recordings_of_a_target_are_waited_for() {
         use CommandUsers::{Any, Copies, Host, Kernels, KernelsAndCopies, VertexShaders};

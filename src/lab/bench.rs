@@ -479,8 +479,8 @@ impl Bench<'_> {
         Ok(())
     }
 
-    /// Measures the variants of a kernel over runs of a length; track by track also those of today's that differ in their
-    /// lanes, as shares of today's time, if none was rejected.
+    /// Measures the variants of a kernel over runs of a length. Track by track, it also measures the engine's present
+    /// variant with other numbers of lanes, relative to the present time, if no variant was rejected.
     fn kernel_row(
         &mut self,
         lab_kernel: LabKernel,

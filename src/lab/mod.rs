@@ -2,10 +2,10 @@
 //! that stay on a device, and reports of a device and of the engine's choices for it. The crate `tumble-verify` names
 //! them for users.
 //!
-//! The lab ([`lab`]) measures on a card other variants of the engine's kernels, and decides by rules that were written
-//! before (`rules.rs`): a card can be had rarely and for minutes. Every variant of a kernel ([`KernelVariant`]) is first
-//! compared with the kernel's twin; one that differs is rejected. Then the ceilings are measured, which no kernel
-//! exceeds, and rows of dispatches of the variants.
+//! The lab ([`lab`]) measures other variants of the engine's kernels on a card. A card is available seldom and for
+//! minutes, so the rules by which the lab decides were written before (`rules.rs`). Every variant of a kernel
+//! ([`KernelVariant`]) is first compared with the kernel's twin; one that differs is rejected. Then the lab measures
+//! the limits that no kernel can exceed, and rows of dispatches of the variants.
 
 mod bench;
 mod resident;

@@ -1,18 +1,18 @@
 //! How the lab decides: functions of measured times, in microseconds, which a test calls with made-up ones. They were
-//! written before a card was measured, so that nothing is chosen by looking at results.
+//! written before a card was measured, so that results cannot influence the choice of the rules.
 
-/// How much shorter a time must be than another's beyond what two measurements of the same differ.
+/// A time counts as shorter than another only if it is shorter by this share plus the spread of two measurements.
 const MARGIN: f64 = 0.02;
 
-/// Linear stores are near the rate of filling, and stores of eight lanes far apart are not: on an H200, which fills 79 MB
-/// in 18.7 µs, below 20.5 µs and from 23 µs on.
+/// Stores side by side count as near the rate of filling below the first ratio. Stores of eight lanes at a distance
+/// count as slower from the second ratio on. On an H200, which fills 79 MB in 18.7 µs, these are 20.5 µs and 23 µs.
 const NEAR_FILL: f64 = 20.5 / 18.7;
 const ABOVE_FILL: f64 = 23.0 / 18.7;
 
 /// The gain from which stores past the caches are chosen.
 const GAIN_OF_STREAMING: f64 = 1.1;
 
-/// The microseconds that barriers between kernels alone must save to be chosen.
+/// Barriers between kernels only are chosen if they save at least this many microseconds.
 const SAVED_BY_SCOPES: f64 = 2.0;
 
 /// A time in microseconds that was measured twice.
@@ -69,7 +69,8 @@ pub(super) fn winner(candidates: &[(Timed, usize)]) -> usize {
     fewest.map_or(0, |(index, _)| index)
 }
 
-/// Whether 32 lanes store a long run rather than eight.
+/// Whether long runs get 32 lanes instead of eight, by the times of filling, of stores side by side, and of stores of
+/// eight lanes at a distance.
 pub(super) fn needs_wide_runs(fill: f64, linear: f64, strided: f64) -> bool {
     linear < NEAR_FILL * fill && strided >= ABOVE_FILL * fill
 }

@@ -1,5 +1,5 @@
-//! The variants of a kernel over spread runs, as data. All give the same bits, so that each is compared with the kernel's
-//! twin. Modules are changed when they are loaded: those that are shipped stay as they are.
+//! The variants of a kernel over spread runs, as data. All give the same bits, so that each is compared with the
+//! kernel's twin. The SPIR-V is changed when it is loaded; the files of the package stay as they are.
 
 use crate::machine::error::VulkanError;
 use crate::output::encoding::Encoding;
@@ -71,12 +71,12 @@ impl KernelVariant {
         Self { stores, ..self }
     }
 
-    /// Whether it is one of the few that have every workgroup and both kinds of stores among them.
+    /// Whether it is one of the few variants that together have every size of workgroups and both kinds of stores.
     pub(super) fn is_typical(self) -> bool {
         (self.stores == StoreCaching::Cached) == (self.workgroup == 64)
     }
 
-    /// The pipelines that it needs beside today's.
+    /// The number of pipelines that it needs in addition to the engine's present ones.
     pub(super) fn new_pipelines(self, today: Self) -> usize {
         usize::from(self.code() != today.code())
     }

@@ -49,8 +49,8 @@ impl HandleRule for BesselOverhauserRule {
             algebra.log_of_step(after.step, after.log),
             ratio(before.duration, after.duration),
         );
-        // The product's logarithm wraps: on its principal branch a long tangent would
-        // point backwards.
+        // The logarithm of the product has several branches. On the principal one, a long tangent would point
+        // backwards, so the branch near the sum is taken.
         let rotation = product(algebra.exp(left), algebra.exp(right));
         let tangent = scaled(
             algebra.log_near(rotation, sum(left, right)),

@@ -423,7 +423,7 @@ struct Spline<'a> {
 /// in radians per interval, times the weight of the interval. `SciPy` converges up to about 5. At 1000 the curve
 /// makes a hundred rotations in an interval, and the solutions are close to each other.
 const STRONGEST: f64 = 1024.0;
-/// The minimum angle for the strength: with an almost zero angle, a curve may make thousands of rotations.
+/// The minimum angle for the strength: with an almost zero angle, a curve may rotate thousands of times.
 const SMALLEST_ANGLE: f64 = 0.1;
 /// If no solution is found, only bends up to half the strength are used, and so on down to this strength.
 const WEAKEST: f64 = 0.5;

@@ -168,7 +168,8 @@ impl<'a> VectorCurves<'a> {
     /// sum, and d their secants.
     fn c2_slopes(&self) -> Vec<DVec3> {
         let last = self.track.keys.len() - 1;
-        // The equation at the key between two intervals: below, diagonal, above, right side.
+        // The equation at the key between two intervals: the coefficients before, on and after the diagonal, and the
+        // right side.
         let inner = |before: usize, after: usize| {
             let (h, next_h) = (self.duration(before), self.duration(after));
             let (l, r) = (ratio(h, h + next_h), ratio(next_h, h + next_h));
@@ -205,8 +206,8 @@ impl<'a> VectorCurves<'a> {
             [_, slope2, bend2, cube2],
             [_, _, _, value3],
         ] = basis;
-        // The step outside an end is computed from the second and first derivative of this interval's basis function
-        // there, and from the first derivative of the basis function of that step.
+        // The step outside an end. `bend` and `inner_slope` belong to the second and the first derivative of this
+        // interval's basis function at the end, `slope` to the first derivative of the outer step's basis function.
         let outside = |bend: f64, inner_slope: f64, slope: f64, next: usize| match self.ends {
             Ends::Natural => rise * (bend / slope),
             Ends::Clamped { .. } => rise * (-inner_slope / slope),

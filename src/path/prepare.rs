@@ -131,7 +131,7 @@ fn body_on(
     }
     let timed_path = TimedPath::new(path, follow);
     stop::check()?;
-    // A body that other bodies face faces along its own path.
+    // If the body itself is the target that all bodies face, it faces along its own path.
     let direction = match follow.direction {
         Direction::Track(target) if target == track => Direction::Tangent,
         direction => direction,

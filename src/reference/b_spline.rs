@@ -33,7 +33,8 @@ fn b_spline(track: &ReferenceTrack, ends: Ends, i: usize) -> Segment {
             Ends::Loop => step(last - outermost),
             Ends::Parabolic => parabola(track, outermost, next),
             Ends::Natural => {
-                // Two factors have a second derivative at the end; for a natural end their sum is 0.
+                // Only two factors have a second derivative at the end. At a natural end, the sum of these two terms is
+                // 0.
                 let second = basis.second_derivatives(t);
                 step(outermost) * (-second[1] / second[outer])
             }

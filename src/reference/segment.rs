@@ -60,8 +60,8 @@ impl Basis {
                 3.0 * t * t,
             ],
             Self::Knots(knots) => {
-                // N_j' = 3 (N_{j,2}/(u_{j+3}-u_j) - N_{j+1,2}/(u_{j+4}-u_{j+1})): in the
-                // sums of the last ones all but one term cancel.
+                // N_j' = 3 (N_{j,2}/(u_{j+3}-u_j) - N_{j+1,2}/(u_{j+4}-u_{j+1})). A basis function is the sum of one N
+                // and all later ones. In the derivative of this sum, all terms but one cancel.
                 let length = knots[3] - knots[2];
                 let [_, n1, n2, n3] = b_spline(knots, 2, knots[2] + t * length);
                 let n = [n1, n2, n3];

@@ -1,4 +1,5 @@
-//! Changes of compiled kernels that measurements compare.
+//! Changes SPIR-V of compiled kernels, for the variants that the lab measures: workgroups of another size, and stores
+//! that stay in the caches.
 
 use std::collections::BTreeMap;
 

@@ -34,7 +34,7 @@ pub(crate) fn in_frames(from: f64, to: f64, extent: f64) -> InFrames {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct InSeconds {
     /// A power of two, by which seconds are multiplied before they are rounded to f32. It is 1 unless the span is so
-    /// short that [`round_f32`] would make 0 of its seconds, or so long that it would make 0 of the scale: then all
+    /// short that [`round_f32`] would change its seconds to 0, or so long that it would change the scale to 0: then all
     /// samples would be at the middle.
     pub(crate) unit: f64,
     /// Half the span's length, in seconds times `unit`.

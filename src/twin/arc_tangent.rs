@@ -5,7 +5,7 @@ use crate::shader::*;
 use crate::simd::lanes::{Choice, Number};
 pub(crate) use crate::twin::functions::{arc_tangent, flushed, reciprocal, reciprocal_root, root};
 
-/// The root of a number of which the reciprocal root is known.
+/// The root of a number whose reciprocal root is known.
 #[inline(always)]
 pub(crate) fn root_by<N: Number>(x: N, inverse: N) -> N {
     let near = x * inverse;

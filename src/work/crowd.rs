@@ -588,8 +588,8 @@ mod tests {
     fn each_step_waits_for_what_it_reads() {
         let half = CrowdOutput::half(CrowdValues::Skinning);
         let unchanged = || frame(EntryChanges::None, VisibleInstances::All);
-        // The next window may overwrite the positions without a further barrier: after they were read, a later step of
-        // this window has already waited.
+        // The next window may overwrite the positions without a further barrier, because a later step of this window
+        // has already waited for the step that reads them.
         let window = "D|D|D|D|D|D";
         let expected = format!("^{window}{window}[Kernel>Any]");
         assert_eq!(steps(half, false, &unchanged()), expected);

@@ -1,4 +1,5 @@
-//! Work for a device, as values that know no device.
+//! Descriptions of the work of a Vulkan device, lists of samples and recordings, as values that do not depend on a
+//! device.
 
 pub(crate) mod crowd;
 pub(crate) mod lists;

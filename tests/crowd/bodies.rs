@@ -296,7 +296,8 @@ fn bodies_have_the_bits_of_the_cpu_on_every_device() {
             let expected = Found::new(&cpu, &bodies, parts, &at, steps);
             for engine in &engines {
                 let robot = DeviceBodies::new(engine, &bodies, parts).unwrap();
-                // All at once, and each alone, which skips what it does not need.
+                // All arrays in one call, and each array in a separate call, which skips steps that the array does not
+                // need.
                 let each = BodyArray::ALL.map(|array| vec![array]);
                 for arrays in each.iter().chain([&BodyArray::ALL.to_vec()]) {
                     let (found, ranges) = robot.sample(&at, steps, arrays).unwrap();

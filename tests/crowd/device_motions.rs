@@ -73,7 +73,8 @@ fn states_have_the_bits_of_the_cpu_in_every_form_of_clips() {
         let motions = |engine: &Engine| DeviceMotions::new(engine, &tables, parts).unwrap();
         let motions: Vec<DeviceMotions> = engines.iter().map(motions).collect();
         for of_device in &motions {
-            // All at once, and each alone, which skips what it does not need.
+            // All arrays in one call, and each array in a separate call, which skips steps that the array does not
+            // need.
             let each = StateArray::ALL.map(|array| vec![array]);
             for arrays in each.iter().chain([&StateArray::ALL.to_vec()]) {
                 let (found, ranges) = of_device.sample(&at, None, arrays, Encoding::F32).unwrap();
@@ -86,7 +87,7 @@ fn states_have_the_bits_of_the_cpu_in_every_form_of_clips() {
                 }
             }
         }
-        // Rotations in other encodings, beside an array of vectors.
+        // Rotations in other encodings, together with an array of vectors.
         let arrays = [
             StateArray::WorldRotations,
             StateArray::Positions,

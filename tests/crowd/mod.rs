@@ -338,7 +338,7 @@ fn every_device_has_the_bits_of_the_cpu() {
                     assert!(rounded, "{name}, {values:?} in 16 bits");
                 }
             }
-            // Nothing is left as it was before, and nothing is no number.
+            // Every value was written, and none is NaN or infinite (the memory was filled with NaN).
             let numbers = expected.iter().flatten().flatten();
             assert!(
                 numbers

@@ -176,7 +176,7 @@ fn rates_are_those_of_differences() {
         let seconds = 2.0 * f64::from(apart) / f64::from(TICKS);
         let three = |of: [f32; 3]| Vec3::from_array(of).as_dvec3();
         let four = |of: [f32; 4]| Quat::from_array(of).as_dquat();
-        // At a key a rate may jump: a few samples have one between the two differences.
+        // A rate may jump at a key, and for a few samples a key lies between the two times of the difference.
         let (mut compared, mut jumps) = (0, 0);
         for i in 0..found.rotations.len() {
             let rate = (three(after.positions[i]) - three(before.positions[i])) / seconds;
@@ -297,7 +297,7 @@ fn some_clips_have_the_states_that_they_have_among_all() {
             let (some, some_spans, some_cells) = tables.select(parts, &[2, 0]).unwrap();
             let some_parts = (&some_spans[..], &some_cells[..]);
             assert!(some_cells.len() < cells.len() && some.clip_count() == 2);
-            // They are sound, as a file's are.
+            // The selected tables pass the checks for tables from files.
             let some = MotionTables::new(some.words(), some_parts).unwrap();
             for (instance, &(clip, tick)) in at.iter().enumerate() {
                 let clip = match clip {
@@ -399,7 +399,7 @@ fn tables_of_keys_have_the_bits_of_tables_of_segments_and_packed_ones_are_within
             assert!(largest <= bound, "{largest}");
         }
     }
-    // Tracks whose times differ, and keys of changing signs, are stored as segments where bits are to be the same.
+    // Tracks with different times, and keys with changing signs, are stored as segments if the bits must stay the same.
     assert!(
         sizes[1] * 3 < sizes[0] * 2 && sizes[2] * 2 < sizes[1],
         "{sizes:?}"

@@ -345,8 +345,8 @@ fn followers_are_the_reference_s() {
                 off < 2e-7,
                 "{round} {method} at {time}: position off by {off:e}"
             );
-            // Where the point ahead passes a corner, the direction's derivative jumps, and a step of the
-            // reference's integration errs by as much.
+            // Where the point ahead passes a corner, the direction's derivative jumps, so the reference's integration
+            // has an error in that step.
             let ahead = matches!(follower.heading, FollowerDirection::Ahead(_));
             let bound = if ahead && method == "linear" {
                 5e-6

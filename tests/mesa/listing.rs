@@ -168,20 +168,20 @@ fn is_exact(instruction: &str, generation: Generation) -> bool {
     };
     match name {
         "add_f32" | "sub_f32" | "subrev_f32" | "mul_f32" => true,
-        // The result is one of the operands, so it is not rounded: made of a comparison and a selection, which
-        // differ from it for NaN and for the sign of zero alone.
+        // The result is one of the operands, so it is not rounded. The compiler makes this instruction of a comparison
+        // and a selection. They differ only for NaN and for the sign of zero.
         "min_f32" | "max_f32" | "min_num_f32" | "max_num_f32" => true,
         "cvt_f32_i32" | "cvt_f32_u32" | "cvt_f32_ubyte0" | "cvt_f32_ubyte1" | "cvt_f32_ubyte2"
         | "cvt_f32_ubyte3" => true,
-        // The pass leaves it in kernels that ask for its rounding.
+        // The exactness pass allows this conversion in kernels that specify its rounding.
         "cvt_f16_f32" => true,
-        // The same: a product with 1 and a sum with -0, which change nothing before the conversion.
+        // The same conversion; the product with 1 and the sum with -0 before it change nothing.
         "fma_mixlo_f16" | "fma_mixhi_f16" => {
             let zero = operands.get(3).copied().unwrap_or_default();
             operands.get(1) == Some(&"1.0") && (zero.starts_with("neg(0)") || zero == "neg(lo(0))")
         }
-        // Two numbers side by side. Where the mode flushes subnormal numbers it would flush them; the kernels that
-        // convert ask for a mode that keeps them, and Mesa packs so only then.
+        // Packs two halves into a word. In a mode that flushes subnormal numbers, this would flush them. But kernels
+        // that convert request a mode that keeps them, and Mesa uses this instruction only in that mode.
         "pack_b32_f16" => true,
         _ if name.starts_with("cmp_") || name.starts_with("cmpx_") => true,
         "mad_f32" | "mac_f32" | "madak_f32" | "madmk_f32" => generation == Generation::Gcn,

@@ -86,14 +86,14 @@ impl Listing {
         count(hot, |_| true).div_ceil(stores.max(1)) as u64
     }
 
-    /// The instructions of a warp on its usual way from the start to the end. `trips` says how often it goes through a
-    /// loop, from the stores of that way through it.
+    /// The instructions of a warp on its typical path from the start to the end. `trips` returns the number of
+    /// iterations of a loop, from the number of stores of one iteration.
     fn typical(&self, trips: &dyn Fn(usize) -> usize) -> usize {
         self.typical_by(&|_, stores| trips(stores), PRODUCTS)
     }
 
-    /// As [`Listing::typical`], where `trips` also gets the block where a loop begins, and blocks with so many products
-    /// or more evaluate.
+    /// As [`Listing::typical`]. `trips` also gets the block at which a loop begins, and blocks with `products` products
+    /// or more count as evaluating.
     fn typical_by(&self, trips: &dyn Fn(usize, usize) -> usize, products: usize) -> usize {
         let all = (0..self.blocks.len()).collect();
         let ends = |at: usize| self.blocks[at].next.is_empty();
@@ -107,7 +107,8 @@ impl Listing {
         walk.from(0, &ends).expect("a way to the end").instructions
     }
 
-    /// The instructions of the usual way through the loop that stores once and lies in another one, if there is one.
+    /// The instructions of the typical path through the loop that stores once and lies in another loop, if there is
+    /// such a loop.
     fn storing_loop(&self) -> usize {
         let loops = self.loops();
         let inner = loops.iter().filter(|(start, body)| {
@@ -120,7 +121,7 @@ impl Listing {
         storing.map(|trace| trace.instructions).max().unwrap_or(0)
     }
 
-    /// The usual way through a loop, once.
+    /// The typical path through one iteration of a loop.
     fn through(
         &self,
         start: usize,
@@ -191,14 +192,15 @@ impl Listing {
     }
 }
 
-/// The products of a block that evaluates, at least.
+/// The minimum number of products of a block that counts as evaluating.
 const PRODUCTS: usize = 9;
 
 /// The blocks of each loop, by the first of them.
 type Loops = BTreeMap<usize, BTreeSet<usize>>;
 
-/// A way through blocks. The usual one stores most and evaluates most; of such ways it is the shortest. So runs that
-/// need care, or a store that asks for each part, are no part of it.
+/// A path through blocks. The typical path stores and evaluates the most; of several such paths, it is the shortest. So
+/// it does not contain the code for runs that need the filter of tiny components, or for stores that compare each part
+/// with the end of the run.
 #[derive(Debug, Clone, Copy, Default)]
 struct Trace {
     stores: usize,
@@ -469,7 +471,8 @@ impl Goal {
             let iterations = end.div_ceil(LANES);
             if self.parts > 1 {
                 all += self.together(listing, iterations);
-                // The first and the last iteration of a run ask for each part, by a loop that stores one.
+                // In the first and the last iteration of a run, a loop compares each part with the end of the run and
+                // stores it.
                 all += 2 * self.parts * listing.storing_loop();
             } else {
                 all += alone(listing, iterations, end / LANES);
@@ -629,7 +632,8 @@ fn crowds_take_as_many_instructions_as_planned() {
 
 /// The instructions of a warp for the rotations of an instance, of the four of a subgroup.
 fn instance_of_rotations(listing: &Listing) -> usize {
-    // Eight lanes find one of 60 spans in two steps. Seven times all lanes have a joint, and then some.
+    // Eight lanes find one of 60 spans in two steps. Seven times all lanes have a joint; after that, only some lanes
+    // have one.
     let trips = |stores| if stores == 0 { 2 } else { 7 };
     listing.typical(&trips).div_ceil(4)
 }
@@ -647,9 +651,10 @@ fn instance_of_matrices(listing: &Listing, levels: usize) -> usize {
         let mut others = loops.iter().filter(|(other, _)| **other != start);
         others.any(|(_, other)| other.is_superset(&loops[&start]))
     };
-    // Joints are read from buffers and put into the workgroup's memory, which the levels change, and stores read.
+    // The loops are distinguished by their instructions. Joints are read from buffers and written to the workgroup's
+    // memory; the loop over levels changes this memory, and the loop of stores reads it.
     let trips = |start: usize, of_first: bool| match (is_inner(start), has(start, "st.shared")) {
-        // 720 rows, after the first ones.
+        // 720 rows remain after the first ones.
         _ if has(start, "st.global") => 10 + usize::from(of_first),
         // The joints of a level are those of the first warp.
         (true, true) => usize::from(of_first),
@@ -661,7 +666,8 @@ fn instance_of_matrices(listing: &Listing, levels: usize) -> usize {
         (false, true) => 4,
         (false, false) => 0,
     };
-    // Curves of translations and scales have ten products, rows that inverse bind matrices multiply twelve.
+    // Only blocks with 13 products or more count as evaluating. So the path avoids curves of translations and scales
+    // (ten products) and products with inverse bind matrices (twelve).
     let warp = |of_first| listing.typical_by(&|start, _| trips(start, of_first), 13);
     (warp(true) + warp(false)).div_ceil(4)
 }

@@ -107,7 +107,7 @@ fn faults(kernel: &str, listing: &Listing, generation: Generation) -> Vec<String
         let of_division = of_division.into_iter().position(|is_found| is_found);
         match of_division.map(|part| &mut left[part]) {
             Some(left) if *left > 0 => *left -= 1,
-            // Mesa 26 computes half of a product so, which is subtracted from 1.5.
+            // Mesa 26 computes half of a product in this way, and subtracts it from 1.5.
             None if kernel == "poses_smooth" && is_exact_half(instruction, generation) => {}
             _ => faults.push(format!("`{instruction}` is not exact")),
         }

@@ -117,7 +117,7 @@ fn assert_stores_whole_lines(
         count.add(&memory, [group, 0, 0], [groups, 1, 1]);
     }
     let found = memory.into_output();
-    // Nothing is stored but the result, once.
+    // Only the result is stored, and each value once.
     assert_eq!(count.words as usize, found.len(), "{kernel:?}");
     let expected: Vec<u32> = match output.is_half {
         true => {

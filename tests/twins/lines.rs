@@ -549,7 +549,7 @@ fn assert_is_the_cpus(
     assert!(found.len() <= expected.len(), "{:?}", launch.kernel);
     let mut left_out = 0;
     for (i, (found, expected)) in found.iter().zip(expected).enumerate() {
-        // The host stores the others, and where a cubic turns too far.
+        // The host stores the remaining samples, and those of cubics that rotate too far.
         if *found == [UNTOUCHED; 4] || *found == [0; 4] {
             left_out += 1;
         } else {
@@ -570,9 +570,9 @@ fn assert_is_the_cpus(
 
 // ---------------------------------------------------------------- the tests
 
-/// Stores touch at most 1.1 times as many lines as they need, those of runs, which end anywhere, 1.2 times as many
-/// of 128 bytes; and loads 1.3 times, frame by frame 1.4 times. Frame by frame, stores of tracks that do not fill whole
-/// lines begin anywhere, and touch 1.25 times as many lines of 128 bytes.
+/// Stores touch at most 1.1 times as many lines as they need. Runs end anywhere, so for lines of 128 bytes their stores
+/// touch up to 1.2 times as many. Loads touch at most 1.3 times as many, frame by frame 1.4 times. Frame by frame,
+/// stores of tracks that do not fill whole lines begin anywhere, and touch up to 1.25 times as many lines of 128 bytes.
 #[test]
 fn cards_touch_hardly_more_lines_than_they_need() {
     let layouts = [Layout::TrackMajor, Layout::FrameMajor];

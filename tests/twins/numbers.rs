@@ -206,7 +206,7 @@ fn rounds() -> usize {
 }
 
 fn assert_results_are_the_same(rule: Rule) {
-    // The numbers of the self-test are chosen; they are compared on devices.
+    // The inputs of the self-test are fixed numbers, so its kernel is compared only on devices.
     let kernels = KERNELS.iter().map(|code| code.kernel);
     for kernel in kernels.filter(|kernel| *kernel != Kernel::SelfTest) {
         let random = &mut Random::canonical();

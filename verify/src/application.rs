@@ -428,7 +428,8 @@ impl Application {
     /// Resets all command buffers, none of which may be in flight.
     pub(crate) fn forget_commands(&self) {
         let flags = vk::CommandPoolResetFlags::RELEASE_RESOURCES;
-        // SAFETY: nothing is in flight: `run` waits. Commands that cannot be taken back stay.
+        // SAFETY: nothing is in flight, because `run` waits. If the reset fails, the commands keep their memory until
+        // the pool is destroyed.
         let _ = unsafe { self.device.reset_command_pool(self.pool, flags) };
     }
 }

@@ -289,7 +289,8 @@ fn buffer_to_buffer(
                         .encoding(encoding)
                         .evaluate_bytes()?;
                     let like = (layout, encoding);
-                    // A range that does not begin at a cache line, and a recording with a larger offset in it.
+                    // The same place by a range that begins three values earlier, not at a cache line, and commands
+                    // that are recorded with an offset of three values in it.
                     let further = 3 * each;
                     let range = (&buffer, (offset - further) as u64);
                     let target = Renderer::clip_target(&clip, frames, like, range)?;

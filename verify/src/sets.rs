@@ -400,7 +400,7 @@ pub(crate) fn typical_layer(random: &mut SeededRandom, library: &CrowdLibrary) -
 
 /// A random layer of an instance.
 pub(crate) fn crowd_layer(random: &mut SeededRandom, library: &CrowdLibrary) -> CrowdLayer {
-    // In this order, in which the recorded crowds draw their numbers.
+    // The order of these calls must not change: the recorded crowds draw their numbers in this order.
     CrowdLayer::new(random.below(library.clip_count()))
         .at(random.between(-3e6, 3e6) as i64)
         .with_speed(random.pick(&[0.0, 1.0, 1.0, -1.0, 0.37, -2.25, 100.0]))

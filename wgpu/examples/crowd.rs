@@ -54,8 +54,9 @@ impl Renderer {
     /// An engine on wgpu's device. It must be dropped before the device.
     fn engine(&self) -> Result<Engine, Box<dyn Error>> {
         let handles = tumble_wgpu::handles(&self.device)?;
-        // SAFETY: the handles belong together, and the engine is dropped before them. Trap 3: the engine submits to
-        // wgpu's queue, so nothing else submits meanwhile: this program has one thread.
+        // SAFETY: the handles belong together, and the engine is dropped before them. The engine submits to wgpu's
+        // queue, and nothing else may submit at the same time (trap 3 of docs/wgpu.md). This program has only one
+        // thread.
         Ok(unsafe { Engine::from_vulkan(handles, &EngineOptions::default())? })
     }
 

@@ -1,5 +1,5 @@
-//! Tumble beside the Rust libraries that people use today, as one contestant of `run.sh`: 4096 tracks of
-//! 26 uneven keys, 1200 frames, into memory that is used again; or one pose a call.
+//! Measures Tumble and other Rust libraries, as one contestant of `run.sh`. The workload is 4096 tracks of 26 uneven
+//! keys at 1200 frames, written into memory that is reused, or one pose for each call.
 //!
 //! ```text
 //! tumble-peers write KEYS               the keys, for all contestants

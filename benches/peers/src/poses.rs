@@ -1,5 +1,5 @@
-//! One pose a call, as a game asks for: 60 joints of ten seconds of motion at 30 Hz, at times that go on by a frame of
-//! 60 a second, and at any times.
+//! Measures one pose for each call, as in a game: 60 joints of ten seconds of motion at 30 Hz, at times that follow
+//! each other by a 60th of a second, and at times in any order.
 
 use std::hint::black_box;
 use std::time::{Duration, Instant};

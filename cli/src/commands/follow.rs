@@ -98,7 +98,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
 }
 
 impl Arguments {
-    /// All that decides over the bytes of a result besides its input.
+    /// Everything that determines a result besides its input.
     fn options(&self, samples: &SampleChoice) -> ResultOptions {
         let mut options = self.command_line.options().of_command("follow");
         options.text += &format!(" times={}", samples.digest());

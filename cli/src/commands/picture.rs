@@ -175,7 +175,8 @@ mod tests {
             };
             (range(|i| i % 200), range(|i| i / 200))
         };
-        // An H with a height of 40: its stems begin at 3.9 and end at 26.2 of its width of 30.1, and it is 29.2 high.
+        // In a font of height 40, the letter H takes a width of 30.1. Its stems reach from 3.9 to 26.2, and it is 29.2
+        // high.
         assert_eq!(drawn("x=\"100\" y=\"100\""), ((104, 155), (71, 99)));
         let middle = drawn("x=\"100\" y=\"100\" text-anchor=\"middle\"");
         assert_eq!(middle, ((74, 125), (71, 99)));

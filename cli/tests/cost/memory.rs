@@ -268,7 +268,7 @@ fn clips_and_streams_keep_to_the_memory_of_the_engine() {
             }
             Some(_) => {
                 assert!(uploading <= of_keys + MIB, "{uploading}");
-                // Lists grow by doubling, and three chunks are in work at once.
+                // Lists grow by doubling, and three chunks are in use at the same time.
                 let allowed = 2 * limit + 4 * MIB;
                 assert!(evaluating <= allowed, "{evaluating}");
                 assert!(streaming <= allowed, "{streaming}");

@@ -7,7 +7,7 @@ fn end() -> ! {
     match std::env::var("CRASH_STATUS") {
         // Destructors would wait for the loader's lock, and the loader for this function.
         Ok(status) if status == "exit" => std::process::exit(0),
-        // At once.
+        // Ends without running destructors.
         Ok(status) => signal_hook::low_level::exit(status.parse().unwrap_or(1)),
         Err(_) => std::process::abort(),
     }

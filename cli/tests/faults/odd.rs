@@ -231,7 +231,7 @@ fn what_the_driver_compiled_is_kept() {
             files.values().map(|(bytes, _)| bytes.clone()).collect()
         };
         match &before {
-            // Rubbish is replaced.
+            // A damaged file is replaced.
             Some(before) if round == 2 => assert_eq!(contents(before), contents(&found)),
             Some(before) => assert_eq!(*before, found),
             None => assert!(contents(&found)[0].len() > 32),

@@ -140,8 +140,8 @@ pub(crate) fn decode_attributes(
         Some(0xa1) => true,
         other => return Err(MeshoptError::Version(other.copied().unwrap_or(0))),
     };
-    // The tail ends with the element before the first and, in version 1, the channels' modes. It is
-    // padded at its front, so that decoders may read past a group's end.
+    // The tail ends with the element from which the first element's differences count and, in version 1, with the modes
+    // of the channels. It is padded at its front, so that decoders may read past the end of a group.
     let channels = if has_channels { stride / 4 } else { 0 };
     let tail = (stride + channels).max(if has_channels { 24 } else { 32 });
     let block = (BLOCK_BYTES / stride / GROUP * GROUP).min(BLOCK);

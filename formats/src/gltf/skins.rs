@@ -18,7 +18,7 @@ const VERTEX: usize = 160;
 /// The largest number of bones, which are numbered in 16 bits.
 const MAX_BONES: usize = u16::MAX as usize + 1;
 
-/// The lists of a file that [`carried`] reads beside its nodes.
+/// The lists of a file that [`carried`] reads in addition to its nodes.
 pub(super) const LISTS: [&str; 3] = ["meshes", "scenes", "skins"];
 
 /// The meshes of the file's scene that move with tracks of a clip; `None` if there are none. The [`LISTS`] of the

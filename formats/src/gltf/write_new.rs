@@ -33,7 +33,7 @@ pub(super) use crate::gltf::write_new::json::{
 };
 pub(super) use crate::gltf::write_new::rig::UniqueNames;
 
-/// Bytes of a GLB beside its JSON and its binary data: a header of 12, and 8 for each of the two.
+/// Bytes of a GLB in addition to its JSON and its binary data: a header of 12, and 8 for each of these two chunks.
 const HEADERS: u64 = 28;
 
 /// Writes clips as GLB, or, if the options' `format` is `gltf`, as text with embedded binary data. Text is built in

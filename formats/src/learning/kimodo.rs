@@ -109,12 +109,13 @@ fn smooth_root(path: &[DVec2]) -> Vec<DVec2> {
         for (index, &position) in found.iter().enumerate() {
             smooth[index * step] = position;
         }
-        // Frames halfway between these; after the last, on its line. For the last resolution they are the same frames.
+        // A frame halfway between two of these gets their mean. A frame after the last of them gets a position on the
+        // line through the last two. With a step of 1, they are these frames themselves.
         let half = step / 2;
         let between = (half..frames).step_by(step);
         let ends_after = between.clone().count() == found.len();
         for (index, frame) in between.enumerate() {
-            // The line to a last frame that was moved begins where it was moved to.
+            // With a step of 1, the last frame is moved to `after_last`, so the frame before it uses that position.
             let next = |index: usize| match half == 0 && index == last {
                 true => after_last,
                 false => found[index],
@@ -152,8 +153,8 @@ fn smoothed(targets: &[DVec2], start: &[DVec2]) -> Vec<DVec2> {
     found
 }
 
-/// The matrix `AᵀA + weight`, where a row of `A` is the acceleration at a frame, factored as `L D Lᵀ`. It has two
-/// diagonals beside the main one.
+/// The matrix `AᵀA + weight`, where a row of `A` is the acceleration at a frame, factored as `L D Lᵀ`. Below the main
+/// diagonal, it has two more.
 struct Accelerations {
     weight: f64,
     diagonal: Vec<f64>,

@@ -198,7 +198,8 @@ pub fn mirrored(clip: &Motion, mirror: Mirror<'_>) -> Result<(Motion, MirrorRepo
         if let Some(channels) = result.channels.get_mut(joint) {
             *channels = clip.channels[partner];
         }
-        // A joint with a parent moves away from where it is at rest as its partner does; others are in the world.
+        // A joint with a parent gets the mirrored displacement of its partner from the partner's rest position.
+        // Positions of joints without a parent are in the world, and are mirrored whole.
         let (at, rest_at) = match above {
             Some(_) => (clip.rest_position(partner), clip.rest_position(joint)),
             None => (DVec3::ZERO, DVec3::ZERO),

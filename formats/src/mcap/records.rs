@@ -241,7 +241,8 @@ impl<'a> Records<'a> {
                             format!("a message of channel {id}, which is not there"),
                         ));
                     }
-                    // The loop ends here, so the bytes are looked up again.
+                    // The function returns a reference to these bytes, so they are borrowed again, outside the loop's
+                    // borrow.
                     let bytes = if in_chunk {
                         &self.chunk[..]
                     } else {

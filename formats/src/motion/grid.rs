@@ -60,7 +60,7 @@ pub(crate) fn frames_before_end(lists: &[Vec<f64>], precision: Precision) -> Opt
     let longest = lists.iter().max_by_key(|list| before_end(list))?;
     let longest = &longest[..before_end(longest)];
     let (&first, &last) = (longest.first()?, longest.last()?);
-    // A quick answer for most clips, whose keys are as far apart at the end as before.
+    // Most clips return here, because their last two keys are as far apart as the others.
     let mean = (last - first) / (longest.len() - 1) as f64;
     let is_short = (0.0..0.999 * mean).contains(&(end - last));
     if longest.len() < FRAMES_IN_A_ROW || !is_short || end == last {
@@ -190,7 +190,7 @@ mod tests {
             assert_eq!(lists[1][1], 3.0 / f64::from(rate));
             assert!((lists[0].last().unwrap() - end).abs() < 1e-7);
         }
-        // Keys set by hand: the last step is a shorter one, like others.
+        // Four even keys are too few for a rate of their own. So the shorter last step determines the rate.
         let mut lists = vec![vec![0.0, 1.0, 2.0, 3.0, 3.5]];
         assert_eq!(
             restore(&mut lists, Precision::F64),

@@ -96,7 +96,8 @@ impl Origin<'_> {
             return Ok(None);
         }
         let mut kept: Vec<usize> = Vec::with_capacity(times.len());
-        // Whether the last kept key is the second of a jump: the key before it was moved away from the same time.
+        // Whether the last kept key is the second one at its time, so that the key before it was moved to an earlier
+        // time.
         let mut jumps = false;
         for key in 0..times.len() {
             let time = times[key];
@@ -181,8 +182,8 @@ fn is_unit(key: DQuat) -> bool {
     (dot(key, key) - 1.0).abs() <= 1.9 * UNIT_TOLERANCE
 }
 
-/// The shortest step to a time beside another, in seconds: beside 0, the next f32 is so near that nothing could be
-/// evaluated between both.
+/// The shortest step from one time to the next, in seconds. The next f32 after 0 is so near that nothing could be
+/// evaluated between the two.
 const SHORTEST: f64 = 1e-9;
 
 /// The f32 after `time`.

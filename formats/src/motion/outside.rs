@@ -140,8 +140,8 @@ impl Outside {
         }
     }
 
-    /// The samples without those that are left out, for times that all tracks share. `rate`: the rate of which the
-    /// samples are frames, if any.
+    /// The samples without those that are left out, for times that all tracks share. `rate` is the rate whose frames
+    /// the samples are, if there is one.
     ///
     /// # Errors
     /// When none is left.

@@ -1,4 +1,4 @@
-//! The scalars of a clip: numbers over time beside its tracks, such as the angles of a robot's joints.
+//! The scalars of a clip: numbers over time in addition to its tracks, such as the angles of a robot's joints.
 
 use std::f32::consts::PI;
 

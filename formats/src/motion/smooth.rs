@@ -35,7 +35,7 @@ pub enum SmoothMotionError {
 pub struct SmoothJob {
     /// The sample times.
     pub frames: SampleTimes,
-    /// The rate of which the samples are frames, if there is one.
+    /// The rate whose frames the samples are, if there is one.
     pub rate: Option<FrameRate>,
     /// The kernel and its options. If a frequency was requested, the kernel is that of the frequency.
     pub smoothing: Smoothing,

@@ -285,7 +285,7 @@ impl Archive {
     /// When it holds anything else: names that cannot be read are not passed over.
     pub(crate) fn texts(&self, name: &str) -> Result<Option<Vec<String>>, Diagnostic> {
         let Some(member) = self.find(name) else {
-            // A pickled list of other values has a member for each.
+            // If the array is a pickled list whose values are not texts, each value is a separate member.
             let is_part = |member: &&Member| {
                 let rest = member.name.strip_prefix(name);
                 member.is_array && rest.is_some_and(|rest| rest.starts_with('.'))

@@ -48,7 +48,8 @@ impl Info {
             {
                 let mut names = Vec::new();
                 collect(feature.get("names").unwrap_or(&Value::Null), &mut names);
-                // The names are used only if their number is that of the values. The names of images are names of axes.
+                // The names are used only if there are as many as values. Those of images name axes, so their number
+                // differs.
                 if Some(names.len())
                     == feature
                         .pointer("/shape/0")

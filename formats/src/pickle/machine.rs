@@ -391,7 +391,7 @@ impl<'a> Machine<'a> {
         match &mut self.nodes[target.index()] {
             Node::List(list) | Node::Set(list) => list.extend_from_slice(items),
             Node::Dict(dict) => dict.extend(pairs),
-            // The state of a class that is not known here; a warning names the class.
+            // Items of an object whose class is not known here are dropped; a warning names the class.
             Node::Inert(_) => {}
             _ => return Err(self.damaged("items are added to a value that has none")),
         }

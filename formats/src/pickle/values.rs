@@ -14,7 +14,7 @@ use crate::warnings::{Warnings, listed};
 /// The largest number of axes of an array that lists in lists become.
 const MAX_AXES: usize = 4;
 
-/// Bytes of memory of a value beside its name and its numbers.
+/// Bytes of memory of a value in addition to its name and its numbers.
 const VALUE: usize = 256;
 
 /// Collects the values of a pickle.

@@ -271,8 +271,8 @@ fn found(scheme: &Scheme, joint_names: &[String], parents: &[Option<usize>]) -> 
             .position(|joint| without_prefix(joint) == name)
     };
     let mut joints = scheme.names.map(named);
-    // A joint is in the right place if, of the joints above it, the nearest one with a role has the role that is
-    // expected: the next higher role that the skeleton has.
+    // A joint is in the right place if the nearest joint above it that has a role has the expected one: the next higher
+    // role that the skeleton has.
     let is_placed = |role: Role| {
         let Some(joint) = joints[role as usize] else {
             return false;

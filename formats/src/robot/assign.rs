@@ -1,5 +1,5 @@
-//! The joints of a robot in the clips of a file: the root and the scalars get the names of the robot's joints. Files that
-//! name no joints have them in an order, which follows from the poses of bodies that the file has beside them.
+//! The joints of a robot in the clips of a file: the root and the scalars get the names of the robot's joints. In files
+//! that do not name joints, their order is found by the poses of bodies that the file also has.
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::f64::consts::TAU;

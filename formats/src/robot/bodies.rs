@@ -149,7 +149,7 @@ pub enum BodiesError {
         /// The names that there are.
         known: Vec<String>,
     },
-    /// The velocity of a centre of mass that the file does not say is asked for.
+    /// The velocity of a centre of mass is requested, but the file does not state where this centre is.
     #[error(
         "the file does not say where the centre of mass of body `{body}` is (`inertial`); ask for the velocity at the \
          origin, or add it"

@@ -243,8 +243,8 @@ impl<'a> Search<'a> {
             self.arrive(opposite, length, arrival);
             lengths[2] = self.arrivals.length(opposite);
         }
-        // The third test of Xin and Wang. For rays that leave to the left, the corner behind lies to their right, and
-        // vice versa; the far end of the window counts.
+        // The third test of Xin and Wang drops a window if a path over the corner behind it reaches the window's far
+        // end sooner. For rays that leave to the left, this is the right corner, and vice versa.
         if goes_left && let Some(child) = window.through_left(&shape, entry, parent) {
             let length = self.shapes[previous(half_edge) as usize].length;
             let limit = child.length + child.distance(child.low) - self.same;

@@ -79,7 +79,7 @@ fn straight(surface: &Surface, source: u32, half_edges: &[u32]) -> Vec<Spot> {
     let Some(&first) = half_edges.first() else {
         return Vec::new();
     };
-    // The first edge lies along x, the source below it.
+    // In the plane of the unfolded faces, the first edge lies on the x axis, and the source is below it.
     let ends = [at(faces, first), at(faces, next(first))];
     let [from, to] = ends.map(|vertex| surface.positions[vertex as usize]);
     let to_source = surface.positions[source as usize] - from;
@@ -89,7 +89,7 @@ fn straight(surface: &Surface, source: u32, half_edges: &[u32]) -> Vec<Spot> {
     let mut known = [(ends[0], DVec2::ZERO), (ends[1], DVec2::new(length, 0.0))];
     let mut target = DVec2::ZERO;
     for (index, &half_edge) in half_edges.iter().enumerate() {
-        // The left end of the edge is the first; the half-edge may begin at either end.
+        // `known` begins with the left end of the edge, but the half-edge may begin at either end.
         edges.push(known);
         let is_reversed = known[0].0 != at(faces, half_edge);
         let shape = Shape::of(surface, half_edge);

@@ -294,7 +294,7 @@ impl<'a> Welding<'a> {
             return known;
         }
         let position = self.input[vertex as usize];
-        // Adding 0 makes 0 of -0.
+        // Adding 0 changes -0 to 0.
         let key = |cell: DVec3| (cell + DVec3::ZERO).to_array().map(f64::to_bits);
         let cell = (position / self.tolerance).floor();
         let cell_key = if self.tolerance > 0.0 {

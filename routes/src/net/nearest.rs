@@ -36,7 +36,7 @@ pub(super) fn nearest(net: &Net, point: DVec3) -> OnNet {
     }];
     let mut heap = BinaryHeap::from([Reverse((Distance(0.0), 0))]);
     while let Some(Reverse((Distance(least), index))) = heap.pop() {
-        // The part lies within the box of its control points.
+        // The part lies within the box of its control points, so no point of it is nearer than that box.
         if least >= best.distance || parts.len() > MAX_PARTS {
             break;
         }

@@ -70,7 +70,8 @@ pub(super) fn plan(walker: &Walker, others: &[(Mover, Stay)]) -> Result<Plan, Wa
     };
     // A route of one point needs no plan.
     let arriving = if last == 0 { walker.start } else { arriving };
-    // Backwards from the goal: each delay was reached from the smallest delay of its gap.
+    // From the goal backwards: at each wait point, the walker arrives with the smallest delay of the gap (the interval
+    // that is not blocked) that contains the delay with which it leaves.
     let mut delays = vec![(arriving, arriving); wait_points.len()];
     let mut current = arriving;
     for index in (0..=last).rev() {

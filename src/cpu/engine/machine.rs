@@ -1,4 +1,4 @@
-//! The CPU as a machine.
+//! The trait `Machine` for the CPU.
 
 use std::sync::Arc;
 

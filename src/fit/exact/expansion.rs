@@ -99,7 +99,7 @@ impl<L: Lanes> Factor<L> {
         let linear = ((three * c3 * middle + two * c2) * middle + c1) * width;
         let quadratic = (three * c3 * middle + c2) * width * width;
         let cubic = c3 * width * width * width;
-        // The square of the larger difference of those at s = -1/2 and at s = 1/2.
+        // The square of the larger one of the differences at s = -1/2 and at s = 1/2.
         let odd = (linear + all::<L>(0.25) * cubic) * all::<L>(0.5);
         let even = quadratic * all::<L>(0.25);
         let (before, after) = (odd - even, odd + even);

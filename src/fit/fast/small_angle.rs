@@ -101,8 +101,8 @@ impl InLanes for SmallAnglePass<'_> {
     fn run<L: Lanes>(&mut self) {
         let Intervals { from, to, .. } = self.intervals;
         let mut is_valid = [0.0; ROW_LEN];
-        // The first curve is in lane 1. Lane 0 is an interval before it that only gives context, or the only interval
-        // of a track, which has no such curve.
+        // The first curve is in lane 1. The interval in lane 0 has no such curve: it is the context of lane 1, or the
+        // only interval of its track.
         for j in (0..self.count.min(LANES)).step_by(L::COUNT) {
             let lanes = j + 1..j + 1 + L::COUNT;
             let [first, last]: [[L; 4]; 2] = [self.weights.load(j + 1), self.weights.load(j + 2)];

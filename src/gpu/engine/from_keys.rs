@@ -43,10 +43,11 @@ impl VulkanEngine {
         })?;
         let mut dispatches = job.dispatches(self.window())?;
         let each = size_of::<Quat>();
-        // The result of a dispatch may begin at any rotation, so bindings must be allowed at any rotation.
+        // The result of a dispatch may begin at any rotation, so the device must allow bindings at every multiple of 16
+        // bytes.
         let info = &self.device.physical.info;
         let imports = self.imports && info.min_storage_buffer_offset_alignment <= each as u64;
-        // The set's keys, where kernels read them in place.
+        // The set's keys as imported memory, if kernels can read them there.
         let mut keys = (job.keys().filter(|_| imports && self.device.reads_texels))
             .and_then(|keys| ImportedMemory::to_read(&self.device, bytemuck::cast_slice(keys)))
             .filter(|keys| keys.start.is_multiple_of(each));

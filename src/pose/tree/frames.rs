@@ -1,4 +1,4 @@
-//! A tree as frames with constants in f32: what kernels walk.
+//! The frames of a tree with constants in f32, along which kernels walk.
 
 use glam::DVec3;
 

@@ -1,5 +1,5 @@
-//! A tree as a list of frames, each of which moves by at most one joint in the one above it: what walks along a tree
-//! follow, in f64 ([`TreeWalk`](crate::trees::TreeWalk)) and in f32 ([`TreeFrames`](crate::trees::TreeFrames)).
+//! A tree as a list of frames. Each frame moves in the frame above it, by at most one joint. Walks along a tree follow
+//! this list, in f64 ([`TreeWalk`](crate::trees::TreeWalk)) and in f32 ([`TreeFrames`](crate::trees::TreeFrames)).
 
 use glam::{DQuat, DVec3};
 
@@ -74,7 +74,8 @@ impl JointFrames {
         let mut values = tree.values.iter();
         for body in &tree.bodies {
             let parent = body.parent.map(|parent| bodies[parent]);
-            // The pose of the next frame in the one above, and the origin of that in the axes of the body.
+            // The pose of the next frame relative to the frame above (`offset` and `rest`). `origin` is the origin of
+            // the frame above, in the axes of the body.
             let (mut above, mut offset, mut rest) = (parent.or(base), body.position, body.rotation);
             let mut origin = DVec3::ZERO;
             for (joint, value) in body.joints.iter().zip(&mut values) {

@@ -27,7 +27,7 @@ pub enum Siblings {
     File,
     /// Sorted by the names of the bodies.
     BodyName,
-    /// Sorted by the names of the bodies' first joints, as in pinocchio; bodies without joints by their own names.
+    /// Sorted by the name of each body's first joint, as in pinocchio. A body without joints is sorted by its name.
     JointName,
 }
 

@@ -1,4 +1,4 @@
-//! Trees by hand; `formats/tests/robots.rs` compares whole robots with `MuJoCo` and pinocchio.
+//! Trees that are written by hand; `formats/tests/robots.rs` compares whole robots with `MuJoCo` and pinocchio.
 
 use super::*;
 

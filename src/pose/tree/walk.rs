@@ -86,7 +86,7 @@ impl WalkScalar {
             (DVec3::Z, WalkAxis::Z),
         ];
         for (coordinate, found) in along {
-            // About an axis in the other direction by the opposite angle.
+            // A rotation about the opposite axis is a rotation about this axis by the opposite angle.
             let sign = axis.dot(coordinate);
             if axis == coordinate * sign && sign.abs() == 1.0 {
                 return Self {
@@ -243,7 +243,8 @@ fn unit<D: Doubles>(q: [D; 4]) -> [D; 4] {
     [x * inverse, y * inverse, z * inverse, w * inverse]
 }
 
-/// A product of unit quaternions, normalised by a step of Newton's: rounding does not add up along the tree.
+/// A product of unit quaternions, normalised by a step of Newton's method, so that rounding errors do not add up along
+/// the tree.
 #[inline(always)]
 fn renewed<D: Doubles>(q: [D; 4]) -> [D; 4] {
     let scale = D::all(1.5) - D::all(0.5) * dot(q, q);
@@ -385,7 +386,7 @@ impl<D: Doubles> Walked<D> {
             let rest = [D::all(x), D::all(y), D::all(z), D::all(w)];
             let rotation = product(self.rotation, rest);
             match frame.motion {
-                // The joint rotates it further.
+                // Not normalised here: below, the joint rotates it further, and then it is normalised.
                 WalkMotion::Hinge(_) | WalkMotion::Ball(_) => self.rotation = rotation,
                 _ => self.rotate(renewed(rotation)),
             }

@@ -84,7 +84,7 @@ impl<'a> SampleList<'a> {
             || timeline.len().saturating_mul(window.tracks.len()) <= spans;
         let are_listed = match timeline.ticks {
             Ticks::Frames { .. } => is_dense,
-            // Explicit times may alternate between the parts of a track: each must have only one.
+            // Explicit times may alternate between the parts of a track, so each track must have only one part.
             Ticks::Times { .. } => {
                 part_count == window.tracks.len() && (is_dense || samples <= SAMPLES_ONE_BY_ONE)
             }

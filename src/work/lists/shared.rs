@@ -518,7 +518,8 @@ mod tests {
                                 panic!("{method}: {track}, {sample}: {found:?}, {expected:?}");
                             };
                             assert!(care || !needs_care, "{method}: {track}, {sample}");
-                            // Of listed times, the distances are equal, not their indices; keys have none.
+                            // With listed times, the distances are compared instead of their indices. Samples at keys
+                            // have no distance.
                             if !distances.is_empty() && !found.0 && !expected.0 {
                                 let of = |list: &[f32], index: i32| {
                                     list[index as usize].to_bits() as i32
@@ -556,7 +557,8 @@ mod tests {
         let shared = SharedRuns::new(request, &window).unwrap().unwrap();
         assert_eq!(bytes(&shared), [3_584]);
         assert_eq!(shared.lists[0].repetitions.count, 1024);
-        // Frame by frame one track of runs of 48 frames, each in two pieces, and a workgroup for 128 tracks.
+        // Frame by frame, the list has the runs of one track: 25 runs of 48 frames, each in two pieces. A workgroup
+        // evaluates 128 tracks.
         let by_frames = Window::whole(4096, timeline.len(), Layout::FrameMajor);
         let shared = SharedRuns::new(request, &by_frames).unwrap().unwrap();
         assert_eq!(bytes(&shared), [1_600]);

@@ -1,4 +1,4 @@
-//! A crowd as games have it: characters that play few clips, each at a time of its own, beside a loop over glam.
+//! Compares a crowd as in games (characters that play few clips, each at a different time) with a loop over glam.
 
 use std::error::Error;
 

@@ -1,4 +1,5 @@
-//! One time a call, as a game or a controller asks: requests and a sampler, on one thread, beside a loop over glam.
+//! Compares requests and a sampler that evaluate one time for each call, as in a game or a controller, with a loop over
+//! glam, on one thread.
 
 use fastrand::Rng;
 use glam::{Quat, Vec3};

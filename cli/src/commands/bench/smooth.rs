@@ -1,4 +1,4 @@
-//! Smoothing of long tracks, beside copying them.
+//! Compares smoothing long tracks with copying them.
 
 use glam::{Quat, Vec3};
 use rayon::prelude::*;

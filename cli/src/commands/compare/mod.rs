@@ -234,7 +234,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     arguments.judge(&report).and(rest)
 }
 
-/// Refuses a directory beside anything but another one. Otherwise the files in it would be counted as inputs.
+/// Refuses to compare a directory with anything except a directory. Otherwise the files in it would be counted as
+/// inputs.
 fn check_kinds(inputs: &Inputs) -> Result<(), Failure> {
     let paths = inputs.named_paths();
     let (directories, others): (Vec<_>, Vec<_>) = paths.iter().partition(|path| path.is_dir());

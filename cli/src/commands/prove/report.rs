@@ -60,13 +60,13 @@ pub(crate) struct Proof {
     pub(crate) random: RandomSection,
     pub(crate) scalars: ScalarSection,
     pub(crate) renderer: Option<RendererReport>,
-    /// Where it was asked for.
+    /// Only if it was requested.
     pub(crate) validation: Option<ValidationSection>,
     pub(crate) compile_times: CompileTimes,
     pub(crate) figures: Option<Figures>,
     /// Steps that ended with an error.
     pub(crate) failures: Vec<String>,
-    /// Steps that could not measure, which is no part of the verdict.
+    /// Steps that could not measure. This does not affect the verdict.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub(crate) warnings: Vec<String>,
 }

@@ -313,8 +313,8 @@ impl ProofRun<'_> {
         Ok(())
     }
 
-    /// Every kernel beside its twin: in engines that read by storage buffers and, where the device can, by
-    /// texel buffers, for which most kernels have a form of their own.
+    /// Compares every kernel with its twin, in an engine that reads storage buffers and, if the device can, in one that
+    /// reads texel buffers, for which most kernels have a separate variant.
     fn kernels(&mut self) -> Result<(), StepError> {
         let allowed = Duration::from_secs(self.options.seconds);
         let mut ran = BTreeSet::new();

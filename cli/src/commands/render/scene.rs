@@ -57,7 +57,7 @@ impl Theme {
     };
 }
 
-/// Bodies, with the curves that are drawn beside them on every frame.
+/// Bodies, with the curves that are drawn in every frame.
 pub(crate) struct Actor {
     pub(crate) name: String,
     pub(crate) tracks: usize,

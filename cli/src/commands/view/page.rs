@@ -44,7 +44,7 @@ pub(crate) struct Page<'a> {
     options: BTreeMap<&'static str, String>,
 }
 
-/// Triangles that stand beside everything.
+/// Triangles of a mesh that does not move (`--mesh`).
 #[derive(Serialize)]
 struct StoredMesh {
     /// x y z of each vertex, f32.

@@ -1,5 +1,5 @@
-//! Files of `torch.save`, as `ProtoMotions` has them: an archive with a pickle in protocol 2, and beside it the bytes of
-//! each tensor.
+//! Files of `torch.save`, as `ProtoMotions` has them: an archive with a pickle in protocol 2, and a member with the
+//! bytes of each tensor.
 //!
 //! The pickle names nothing but tensors, so that `torch.load(…, weights_only=True)` reads it. `ProtoMotions` sets its
 //! enum `state_conversion` itself when it loads a file.

@@ -540,7 +540,7 @@ impl ClipPair<'_> {
         (first.time_offset - second.time_offset) as f64 - self.offset
     }
 
-    /// Refuses rotations relative to the parents beside rotations relative to the world.
+    /// Refuses to compare rotations relative to the parents with rotations relative to the world.
     ///
     /// # Errors
     /// When one clip has rotations relative to the parents and the other relative to the world; the error names both.

@@ -1,4 +1,4 @@
-//! Files of `torch.save`: a ZIP archive with a pickle, and beside it the bytes of each storage.
+//! Files of `torch.save`: a ZIP archive with a pickle, and a member with the bytes of each storage.
 
 use std::collections::HashMap;
 use std::ops::Range;
