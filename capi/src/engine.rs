@@ -66,7 +66,8 @@ unsafe impl SizedStructure for TumbleEngineOptions {
 ///
 /// `device` selects the device by a name in upper or lower case:
 ///
-/// - "auto", or null: the CPU or the exact Vulkan device that is measured to be the fastest;
+/// - "auto", or null: the CPU or the exact Vulkan device that is measured to be the fastest for large results;
+///   the choice is made once, here;
 /// - "cpu": the CPU;
 /// - "vulkan": the first Vulkan device that can be opened and passes the self-test;
 /// - any other text: the Vulkan device with this index, counted from 0, or the first one whose name contains the

@@ -40,7 +40,7 @@ pub enum TumbleEnds {
     Secant = 4,
     /// The curve is closed and smooth there. The last key must equal the first, within 0.002 rad.
     Loop = 5,
-    /// The first and the last interval are constant, with the value of the first key of each.
+    /// The first and the last interval are constant: each has the value of its first key.
     Frozen = 6,
 }
 

@@ -263,11 +263,11 @@ codes! {
     SeveralClips = "E413" elsewhere, "several clips for one table", "A table with a row for each time contains one clip. Write the clips to separate files, or as Parquet.";
     ColumnsAmbiguous = "E414", "columns of two meanings", "The columns `x y z` may belong to a quaternion `x y z w`, or to a position if the quaternion's columns have numbers after their names (`x_1`, `x.1`). Select one with `--map`.";
     // E5xx and W5xx: trajectories.
-    TumPose = "E501", "not a pose with a time", "A line has eight numbers: `t x y z qx qy qz qw`.";
+    TumPose = "E501", "not a pose with a time", "A line has eight numbers: `t x y z qx qy qz qw`. Further numbers are ignored if every line has as many of them.";
     TumTime = "E502", "a time out of range", "Times in seconds are at most 1e14 in magnitude. A first time from 1e11 on is taken for another unit (W305).";
     TumEmpty = "E503", "no poses", "All lines are blank or comments.";
     TumWrite = "E504" elsewhere, "a clip that a trajectory cannot store", "A trajectory has one clip with one track, whose times must differ after rounding to the format's precision. KITTI does not store times; poses that are not at frames of a rate need a separate file of times, `--times-out`, in Python `times_out`.";
-    KittiPose = "E505" elsewhere, "not a pose of KITTI", "A line has twelve numbers: the three rows of a matrix, a rotation and a translation. A fourth row `0 0 0 1` and further numbers after them are allowed, if all lines have as many.";
+    KittiPose = "E505" elsewhere, "not a pose of KITTI", "A line has twelve numbers: the three rows of a matrix, a rotation and a translation. A fourth row `0 0 0 1` and further numbers after them are allowed if every line has as many of them.";
     NoRotation = "E506" elsewhere, "a matrix that is not a rotation", "The rows of a rotation matrix have length 1 and are orthogonal, and its determinant is 1. In files of KITTI-360, a frame number before the matrix causes this error: remove it, and give the times of the frames by `--source-times`, in Python `source_times`.";
     FrameTimes = "E507" elsewhere, "not a time for each pose", "A file of times has one number on each line, the time of a pose in seconds, in the order of the poses.";
     // E6xx: paths.
@@ -277,7 +277,7 @@ codes! {
     Mesh = "E610" elsewhere, "not a mesh", "A mesh is OBJ, PLY, GLB or glTF. Its faces have at least three corners, which are existing vertices with finite coordinates.";
     Net = "E611" elsewhere, "not a net", "A net of control points is NPY of floats and of shape (m, n, 3), each side 2 to 32.";
     Pairs = "E612" elsewhere, "not a pair", "Each line has six numbers: x y z of the start, then of the goal.";
-    Walkers = "E613" elsewhere, "not a walker", "A walker needs a name without folders, radius, speed, x, y, z, to_x, to_y and to_z. A moving obstacle needs name, radius and track, a file with rows t, x, y, z at increasing times.";
+    Walkers = "E613" elsewhere, "not a walker", "A walker needs radius, speed, x, y, z, to_x, to_y and to_z. A moving obstacle needs radius and track, a file with rows t, x, y, z at increasing times. The name is optional and must not contain folders.";
     Offsets = "E614" elsewhere, "offsets that do not fit", "Offsets are three numbers for each joint, its position relative to its parent, in the order of the joints.";
     // E7xx and W7xx: FBX.
     FbxDamaged = "E701", "an FBX file that cannot be read", "It is truncated, damaged, or not an FBX file, or has decimal commas. The message is that of the library that reads FBX, which gives no location.";
@@ -323,7 +323,7 @@ codes! {
     EqualKeys = "W013", "a key given twice", "Two keys at the same time have equal values; the second is left out.";
     AccelerationJumps = "W014" elsewhere, "an angular acceleration that jumps", "With the method `c2` the angular acceleration is continuous, except at these keys: no such curve was found, or it would rotate many times between two keys. There only the velocity is continuous. The usual cause is a very short interval next to a very long one. Add keys in the long interval, or use `-m bessel-overhauser`.";
     OutsideKeys = "W015" elsewhere, "times outside the keys", "Some sample times are before the first key or after the last one. They get the value of this key, unless `--before` or `--after` selects another behaviour, such as `loop`.";
-    InGaps = "W016" elsewhere, "times in gaps between keys", "The keys beside them are further apart than `--max-gap`. `--in-gaps` selects whether such times are left out, held at the key before, or refused.";
+    InGaps = "W016" elsewhere, "times in gaps between keys", "Some times lie between two keys that are further apart than `--max-gap`. `--in-gaps` selects whether such times are left out, held at the key before, or refused.";
     EndLeftOut = "W017" elsewhere, "an end that is left out", "A smoothing kernel needs evenly spaced samples, and the last of them is before the end of the clip. To keep the end, choose a rate (`--fps`) that has a frame there.";
     OpenLoop = "W018" elsewhere, "a loop whose ends differ", "With `--edges loop` the last sample repeats the first. Here the rotations of the two differ by more than rounding or the noise of a recording could explain, so the clip is not a loop, or not a whole one.";
     RequiredExtension = "W100", "an unknown required extension", "The animations are read without it; data that needs it is refused.";
@@ -337,7 +337,7 @@ codes! {
     BufferLong = "W108", "a buffer longer than it says", "Bytes after the stated length are not read.";
     TargetPath = "W109", "an unknown target", "The channel animates a property that glTF 2.0 does not define. It is copied unchanged.";
     StaysOutside = "W110" elsewhere, "a file that stays outside", "The file could not be included in the GLB, or the output is in another folder than the input. The URI is kept.";
-    StaysWhole = "W111" elsewhere, "channels that are not cut", "Channels of properties that are not read, such as materials, are copied unchanged, so the animation is as long as these channels.";
+    StaysWhole = "W111" elsewhere, "channels that are not cut", "Channels of properties that are not read, such as materials, are copied unchanged and not cut. Therefore the animation does not end before they do.";
     NoMorphTargets = "W112", "weights without morph targets", "The channel moves the weights of a node whose mesh has no morph targets, or that has no mesh. It is copied unchanged.";
     BvhMoreRows = "W201", "more rows than frames", "The rows after the last frame are left out.";
     BvhNoFrames = "W202", "no frames", "The skeleton does not move.";

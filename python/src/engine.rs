@@ -24,7 +24,7 @@ pub(crate) const MIN_DEVICE_ROTATIONS: usize = 1 << 20;
 /// * `device`: "auto", the CPU, and for calls of a million rotations or more the device that is measured to be the
 ///   fastest; "cpu"; "first", the first Vulkan device that is exact, else the CPU; "vulkan"; or a device's index or
 ///   part of its name (`tumble.devices()`). All give the same bits.
-/// * `memory`: bytes of a Vulkan device that segments may take.
+/// * `memory`: the most bytes that segments may take, in the memory of the device.
 /// * `threads`: the number of threads of the CPU.
 /// * `allow_inexact`: use a device that fails its self-test.
 /// * `cache`: the directory in which a Vulkan device's compiled kernels, checks and speed are kept; "off" keeps no

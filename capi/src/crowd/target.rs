@@ -80,7 +80,7 @@ pub unsafe extern "C" fn tumble_crowd_target_new(
 /// `stage` is a `TumbleCrowdStage`. A frame is then, for example: `tumble_crowd_record` with a target for
 /// `TUMBLE_CROWD_VALUES_LOCAL` in this range, the application's own commands that change these matrices (inverse
 /// kinematics), and `tumble_crowd_record` with the stage's target, which makes them skinning matrices. The stage
-/// continues the matrices of as many instances as are visible when it is recorded. Anything may have written these
+/// continues the matrices of as many instances as are visible when it is recorded. The application may have changed these
 /// matrices. Results have the bits of the CPU, if all numbers are finite and less than 2^36 in magnitude; where
 /// nothing was changed, they have the bits of an evaluation without stages. The buffer, its range and the errors
 /// are as for `tumble_crowd_target_new` with matrices in 32 bits.

@@ -86,7 +86,7 @@ pub(crate) struct ReadingArguments {
     /// file with `x y z` per line, in the order of the joints, or `name x y z` in any order
     #[arg(long, value_name = "FILE")]
     offsets: Option<PathBuf>,
-    /// A model of SMPL, SMPL-H or SMPL-X as NPZ, or a folder with one per gender: the offsets of joints
+    /// A model of SMPL, SMPL-H or SMPL-X as NPZ or pickle, or a folder with one per gender: the offsets of joints
     /// are computed from it, for the body shape of the motion
     #[arg(long, value_name = "MODEL", conflicts_with = "offsets")]
     body_model: Option<PathBuf>,

@@ -395,7 +395,7 @@ impl Clip {
     /// The clip with some of its joints, `tracks`, by their names or indices, in this order. Their parents must be
     /// included, too, unless `collapse`: then the motion of a joint that is left out is not lost. Its child becomes a child of
     /// the nearest ancestor that is included, or a root, with the product of the rotations and translations in between, so that
-    /// included joints have the same poses in the world at their keys. Such a joint has keys of translations if a joint above it
+    /// included joints have the same poses in the world at their keys. Such a joint has keys of translations if a joint in between
     /// turns, at the key times of all joints in the product.
     ///
     /// >>> import tumble
