@@ -3,7 +3,7 @@
 
 use rayon::prelude::*;
 
-use crate::crowd::lane_states::{InstanceGroup, put, three};
+use crate::crowd::states::lanes::{InstanceGroup, put, three};
 use crate::crowd::states::{
     FrameStep, JOINT_NUMBERS, MotionTables, PoseScratch, PoseValues, Poses, TASK, check_clips,
     check_steps, ends_of_steps, steps_per_second,

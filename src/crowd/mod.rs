@@ -56,7 +56,6 @@ pub(crate) mod device_motions;
 pub(crate) mod events;
 pub(crate) mod fade;
 pub(crate) mod instances;
-mod lane_states;
 pub(crate) mod lay_over;
 pub(crate) mod layer;
 pub(crate) mod library;

@@ -3,6 +3,8 @@
 //! so that every machine has the same bits. Twin of `shaders/motion/joints.wgsl`,
 //! `shaders/motion/walk.wgsl` and `shaders/motion/differences.wgsl`.
 
+pub(super) mod lanes;
+
 use std::ops::Range;
 
 use rayon::prelude::*;
@@ -10,7 +12,7 @@ use rayon::prelude::*;
 use crate::crowd::channel_curve::constants_of;
 use crate::crowd::clip_keys::{KeyRows, keeps_keys};
 use crate::crowd::clip_tables::{ClipTables, runs_of};
-use crate::crowd::lane_states::{InstanceGroup, put_differences, put_states, walk};
+use crate::crowd::states::lanes::{InstanceGroup, put_differences, put_states, walk};
 use crate::crowd_error::CrowdError;
 use crate::engine::Engine;
 use crate::math::canonical::canonical;

@@ -215,6 +215,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     if (arguments.start, arguments.end) != (None, None) && arguments.fps.is_none() {
         return Err(Failure::usage("--start and --end are for --fps; add it"));
     }
+    arguments.check_trajectories()?;
     if let Some(folders) = folders::named(&arguments.inputs) {
         return folders::run(arguments, folders);
     }
@@ -341,26 +342,37 @@ impl Arguments {
         has_option || self.ape || self.rpe.is_some()
     }
 
+    /// Whether absolute errors of trajectories are computed.
+    fn is_absolute(&self) -> bool {
+        self.ape || self.rpe.is_none()
+    }
+
+    /// Refuses options that contradict those of trajectories.
+    fn check_trajectories(&self) -> Result<(), Failure> {
+        if !self.is_of_trajectories() {
+            return Ok(());
+        }
+        if self.fps.is_some() || self.world {
+            let message = "trajectories are compared in the world at their poses; leave out --fps and --world";
+            return Err(Failure::usage(message));
+        }
+        if !self.is_absolute() && (self.tolerance.is_some() || self.distance.is_some()) {
+            let message = "--tolerance and --distance are limits of absolute errors; add --ape, or leave them out";
+            return Err(Failure::usage(message));
+        }
+        if matches!(self.associate, Some(Associate::Nearest(_))) && self.max_gap.is_some() {
+            return Err(Failure::usage(
+                "--max-gap is for interpolated poses, and --associate nearest takes poses as they are; leave out one",
+            ));
+        }
+        Ok(())
+    }
+
     /// The one track of both files, as paths.
     fn trajectory(
         &self,
         paths: [&Path; 2],
     ) -> Result<(PathDifference, Result<(), Failure>), Failure> {
-        if self.fps.is_some() || self.world {
-            let message = "trajectories are compared in the world at their poses; leave out --fps and --world";
-            return Err(Failure::usage(message));
-        }
-        let is_absolute = self.ape || self.rpe.is_none();
-        if !is_absolute && (self.tolerance.is_some() || self.distance.is_some()) {
-            let message = "--tolerance and --distance are limits of absolute errors; add --ape, or leave them out";
-            return Err(Failure::usage(message));
-        }
-        let associate = self.associate.unwrap_or_default();
-        if matches!(associate, Associate::Nearest(_)) && self.max_gap.is_some() {
-            return Err(Failure::usage(
-                "--max-gap is for interpolated poses, and --associate nearest takes poses as they are; leave out one",
-            ));
-        }
         let [first, second] = [
             self.inputs.load_one(paths[0])?,
             self.second_inputs(paths[1])?.load_one(paths[1])?,
@@ -387,9 +399,9 @@ impl Arguments {
             Engine::new(Device::Cpu).map_err(|error| Failure::evaluating(&names[0], &error))?;
         let measure = PathMeasure {
             align: self.align.unwrap_or_default(),
-            is_absolute,
+            is_absolute: self.is_absolute(),
             step: self.rpe,
-            associate,
+            associate: self.associate.unwrap_or_default(),
             max_gap: self.max_gap,
             offset: self.time_offset.unwrap_or_default(),
         };

@@ -19,10 +19,10 @@ use crate::twin::functions::{polynomial_begin, polynomial_end};
 
 /// Some instances, at most as many as a vector has lanes, each with a clip and a tick.
 #[derive(Clone, Copy)]
-pub(super) struct InstanceGroup<'a> {
-    pub(super) poses: Poses<'a>,
-    pub(super) at: &'a [(u32, u32)],
-    pub(super) located: &'a LocatedTicks,
+pub(in crate::crowd) struct InstanceGroup<'a> {
+    pub(in crate::crowd) poses: Poses<'a>,
+    pub(in crate::crowd) at: &'a [(u32, u32)],
+    pub(in crate::crowd) located: &'a LocatedTicks,
 }
 
 /// The clip of an instance, at its tick.
@@ -61,7 +61,7 @@ impl InstanceGroup<'_> {
     /// Computes the states in the parents' frames to `numbers`, which has [`JOINT_NUMBERS`] vectors for each joint, and the
     /// rotations to `local`, `[instance][joint]`, if it is not empty.
     #[inline(always)]
-    pub(super) fn pose<L: Lanes>(
+    pub(in crate::crowd) fn pose<L: Lanes>(
         &self,
         values: PoseValues,
         local: &mut [[f32; 4]],
@@ -165,13 +165,13 @@ fn put_velocities<L: Lanes>(state: &Joint<L>, at: (usize, usize), states: &mut M
     put::<L, _>(states.angular_velocities, [x, y, z, zero], at, three);
 }
 
-pub(super) fn three([x, y, z, _]: [f32; 4]) -> [f32; 3] {
+pub(in crate::crowd) fn three([x, y, z, _]: [f32; 4]) -> [f32; 3] {
     [x, y, z]
 }
 
 /// Stores the values of one joint of a group in an array of all joints, unless it is empty.
 #[inline(always)]
-pub(super) fn put<L: Lanes, T>(
+pub(in crate::crowd) fn put<L: Lanes, T>(
     array: &mut [T],
     components: [L; 4],
     (joint, joints): (usize, usize),
