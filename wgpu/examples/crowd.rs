@@ -4,6 +4,8 @@
 //! joint by the joint's matrix. Tumble records the matrices of every frame into wgpu's command buffers. At the end the
 //! matrices and the points are compared with the CPU's. docs/wgpu.md explains the three traps.
 
+#![allow(clippy::disallowed_methods)] // poses to look at
+
 use std::error::Error;
 
 use tumble::crowd::{Crowd, CrowdLayer, CrowdLibrary, CrowdValues};
