@@ -47,7 +47,7 @@ pub struct WrittenDialect {
     pub assumed_rate: Option<u64>,
     /// Whether its readers only accept rates of whole frames per second.
     pub has_whole_rate: bool,
-    /// What another ending than [`WrittenDialect::extension`] means to its readers, if they decide by it.
+    /// The meaning of other endings than [`WrittenDialect::extension`] to its readers, if they decide by it.
     pub other_endings: Option<&'static str>,
     /// Whether it can have further arrays, which its readers ignore.
     pub takes_descriptions: bool,
