@@ -1,5 +1,5 @@
-//! Parts of an evaluation, each alone: `cargo bench`. For comparisons with others, and
-//! of whole evaluations, see `tumble bench` and `benches/peers`.
+//! Measures parts of an evaluation separately: `cargo bench`. `tumble bench` and `benches/peers` measure whole
+//! evaluations and compare with other code.
 
 // Tests may use what systems round differently (clippy.toml).
 #![allow(clippy::disallowed_methods)]

@@ -1,5 +1,5 @@
-//! Which shaders the compiled kernels were made from: a list of hashes of the files in `shaders/`.
-//! The compiler of the shaders (`shader-compiler/`) writes it, the engine's build compares it.
+//! The list of hashes of the files in `shaders/` from which the compiled kernels were made. The compiler of the shaders
+//! (`shader-compiler/`) writes it, and the engine's build script compares it.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;

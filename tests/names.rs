@@ -1,4 +1,4 @@
-//! The names of options, and requests of sets beside those of clips.
+//! Tests of the names of options, and a comparison of requests of sets with requests of clips.
 
 use std::fmt::{Debug, Display};
 use std::str::FromStr;

@@ -1,4 +1,4 @@
-//! The exactness pass, on its own and under the SPIR-V validator.
+//! Tests of the exactness pass, alone and with the SPIR-V validator.
 
 use std::collections::BTreeMap;
 use std::io::Write;

@@ -1,4 +1,5 @@
-//! Translations and scales beside rotations agree with the textbook, with the same bits on every device.
+//! Translations and scales that are evaluated together with rotations agree with the textbook, with the same bits on
+//! every device.
 
 use crate::support::{KERNEL_OPTIONS, Random, is_due, vulkan_engines};
 use glam::{DVec3, Quat, Vec3};

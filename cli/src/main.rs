@@ -1,4 +1,4 @@
-//! The program `tumble`; the code is in the library beside it.
+//! The program `tumble`; its code is in the library of this package.
 
 use std::process::ExitCode;
 

@@ -1,5 +1,5 @@
-//! Files import in one direction: types lie below the code that lists or drives them. A circle of imports
-//! has no bottom where one could begin to read.
+//! Files import in one direction: types are below the code that lists or uses them. A circle of imports would have no
+//! file with which a reader can begin.
 //!
 //! The imports are taken from the text: paths that begin with `crate`, `super` or `self`. A file and its
 //! child modules count as one: a child's imports from its parent do not count. Unit tests may import from

@@ -1,5 +1,5 @@
-//! Beside numbers that are not ours: `SciPy` and the Python package `splines`
-//! (`cli/tests/peers`). `scripts/test.sh` makes the environment.
+//! Compares with numbers of other programs: `SciPy` and the Python package `splines` (`cli/tests/peers`).
+//! `scripts/test.sh` makes the environment.
 
 use std::process::Command;
 

@@ -1,7 +1,7 @@
 //! The Khronos validation layer over all that the program does (the library: `tests/validation.rs`): core and
-//! synchronization checks, and checks on the device itself (GPU-assisted), which a newer
-//! layer does better; Debian's `chromium` package brings one. Each kind of check has to
-//! find a planted fault first: a layer that sleeps has nothing to say either.
+//! synchronization checks, and checks on the device itself (GPU-assisted), which a newer layer does better; Debian's
+//! `chromium` package brings one. Each kind of check must first find a planted fault, because a layer that does not
+//! work reports nothing either.
 #![allow(unsafe_code)] // the planted faults
 
 use std::process::Command;

@@ -1,4 +1,4 @@
-//! Which operations round exactly, and where a module has others.
+//! The list of the operations that round exactly, and a search for other operations in a module.
 
 use std::collections::BTreeSet;
 use std::fmt;

@@ -1,6 +1,6 @@
-//! CUDA's driver, as far as results on a card need it. Its library is opened when the first such result is asked
-//! for; memory and semaphores come as files that the Vulkan driver exports, and the devices of both are the same
-//! where their UUIDs are.
+//! The functions of CUDA's driver that results on a card need. Its library is opened for the first such result. The
+//! Vulkan driver exports memory and semaphores as file descriptors. A device of CUDA and a device of Vulkan are the
+//! same if their UUIDs are equal.
 //!
 //! `unsafe`: functions of a C library.
 #![allow(unsafe_code)]

@@ -1,5 +1,5 @@
-//! The claim on a lavapipe that is years newer than the system's: recorded hashes, the self-test,
-//! and one way of reading against the CPU.
+//! Tests a lavapipe that is newer than the system's by years: the recorded hashes, the self-test, and one way of
+//! reading compared with the CPU.
 
 use std::path::Path;
 use std::process::Command;

@@ -1,5 +1,5 @@
-//! Mesa's drivers where there is no card: RADV and NVK, which compile for AMD's and NVIDIA's processors
-//! without one, and a lavapipe of today beside that of the system. `scripts/mesa.sh` unpacks them.
+//! Mesa's drivers on a machine without a card: RADV and NVK, which compile for AMD's and NVIDIA's cards, and a lavapipe
+//! that is newer than the system's. `scripts/mesa.sh` unpacks them.
 
 mod compile;
 mod lavapipe;

@@ -1,7 +1,7 @@
-//! Every kernel compiled for NVIDIA's processors, none of which need be there: Mesa's NVK on a layer that stands in
-//! for the kernel's driver (`mesa-drm-shim`) makes a device that cannot compute, and compiles for it.
-//! Every instruction on floats must round as the shader says. NVIDIA's driver has a compiler of its own; both must
-//! obey the decorations, and both need nearly as many instructions for a kernel.
+//! Compiles every kernel for NVIDIA's cards, without a card: `mesa-drm-shim` replaces the driver in the kernel of
+//! Linux, and Mesa's NVK creates a device for which it can compile but not compute. Every instruction on floats must
+//! round as the shader requires. NVIDIA's driver has another compiler. Both must obey the decorations, and both need
+//! about the same number of instructions for a kernel.
 //!
 //! Debian 12 has no NVK. Debian 13's runs beside this system's libraries with its own loader and C library.
 

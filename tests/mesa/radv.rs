@@ -1,7 +1,7 @@
-//! AMD's real compiler over every kernel, for six families of processors, none of which need be there:
-//! with `RADV_FORCE_FAMILY` set, Mesa's RADV makes a device that cannot compute, and
-//! compiles for it. Since Mesa 26.2 a layer that stands in for the kernel's driver does this, with `AMDGPU_GPU_ID`.
-//! The listing is read, and every instruction on floats must round as the shader says.
+//! Compiles every kernel for six families of AMD's cards, without a card: with `RADV_FORCE_FAMILY`, Mesa's RADV creates
+//! a device for which it can compile but not compute. Since Mesa 26.2, a layer that replaces the driver in the kernel
+//! of Linux does this, with `AMDGPU_GPU_ID`. The test reads the listing; every instruction on floats must round as the
+//! shader requires.
 //!
 //! The system's RADV and a newer one are asked, and the newest one where it is unpacked. Catches a driver that fuses in spite of the
 //! decorations, a kernel that lacks one, spilled registers, and a kernel that got dearer.

@@ -1,4 +1,4 @@
-//! The tables of `docs/gpu-compilers.md`: the costs of kernels on processors of AMD's and NVIDIA's, one by one.
+//! The tables of `docs/gpu-compilers.md`: the instructions and registers of each kernel on AMD's and NVIDIA's cards.
 //! `UPDATE_LISTINGS=1 cargo test --test all mesa::` writes the measured numbers into their cells.
 
 use std::collections::BTreeMap;

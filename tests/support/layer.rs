@@ -1,4 +1,4 @@
-//! The Khronos validation layer, the system's and a newer one, over another process.
+//! Runs a process under the Khronos validation layer: the system's, or a newer one.
 #![allow(dead_code)] // each test program uses some of it
 
 use std::fs;

@@ -1,5 +1,5 @@
-//! The shaders' functions as they are written for the CPU, for lanes or by hand, beside the kernels' own, on hostile
-//! arguments.
+//! Compares the functions of the shaders as the CPU has them (generated for lanes, or written by hand) with those in
+//! the kernels, on hostile arguments.
 
 use std::fmt::Debug;
 

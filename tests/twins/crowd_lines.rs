@@ -1,5 +1,5 @@
-//! How many lines of memory the waves of a card touch when they evaluate whole instances of a crowd, counted as in
-//! `lines.rs`. Their results must be the CPU's.
+//! Counts the lines of memory that the waves of a card touch when they evaluate whole instances of a crowd, as
+//! `lines.rs` does. The results must be the CPU's.
 
 use fastrand::Rng;
 use glam::{Affine3A, Vec3};

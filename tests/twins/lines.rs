@@ -1,8 +1,8 @@
-//! How many lines of memory the waves of a card touch, and how many statements they execute. Cards run 32 or 64
-//! invocations together, and move memory in lines: sectors of 32 bytes on NVIDIA's, lines of 64 or 128 on AMD's. A wave
-//! executes a branch if any of its invocations takes it. Here the kernels that cards are given run over the work lists
-//! of workloads as `tumble bench` has them, smaller ones. No device is needed: only addresses and branches count,
-//! and those follow from the shaders. Their results must be the CPU's.
+//! Counts the lines of memory that the waves of a card touch, and the statements that they execute. Cards run 32 or 64
+//! invocations together, and move memory in lines: sectors of 32 bytes on NVIDIA's cards, lines of 64 or 128 bytes on
+//! AMD's. A wave executes a branch if any of its invocations takes it. The tests run the kernels for cards, as Rust,
+//! over the work lists of small workloads like those of `tumble bench`. No device is needed, because only addresses and
+//! branches count, and these follow from the shaders. The results must be the CPU's.
 
 use std::cell::{Cell, RefCell};
 use std::collections::{BTreeMap, BTreeSet};

@@ -1,7 +1,7 @@
-//! Mistakes anywhere in the kernels, planted one after another. Each has to change what a kernel stores of the inputs
-//! with which devices are checked, or what a function returns of hostile arguments. Hashes of all of these are
-//! recorded: they find a mistake in a shader, which all that is made of it shares; the check of kernels finds one
-//! that a driver makes.
+//! Plants mistakes in the kernels, one after another. Each must change a value that a kernel stores for the inputs of
+//! the check of kernels, or a result of a function for hostile arguments. The hashes of all these results without
+//! mistakes are recorded. They find a mistake in a shader, which all code that is generated from the shader shares. The
+//! check of kernels finds mistakes of a driver.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::panic::{AssertUnwindSafe, catch_unwind};

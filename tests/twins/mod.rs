@@ -1,5 +1,5 @@
-//! Without a device: the kernels as Rust ([`entries`](crate::twin::entries)), which their compiler writes from the same
-//! representation as the SPIR-V, beside what the CPU has.
+//! Compares the kernels as Rust ([`entries`](crate::twin::entries)) with the CPU's code, without a device. The compiler
+//! of the shaders writes the kernels as Rust from the same representation as the SPIR-V.
 //!
 //! * `arithmetic.rs`: functions that are written for lanes, and those that are written by hand, on hostile arguments;
 //! * `on_trials.rs`: whole kernels on the inputs of the kernels' check, and the CPU's way to the same;

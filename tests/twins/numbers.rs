@@ -1,5 +1,5 @@
-//! Numbers as devices may compute with them, where Vulkan or a translator of its shaders leaves a choice. The inputs
-//! are those of the kernels' check.
+//! Runs the kernels with numbers as devices may compute them, if Vulkan or a translator of shaders leaves a choice:
+//! flushed subnormal numbers, fused products. The inputs are those of the check of kernels.
 
 use std::cell::{Cell, RefCell};
 use std::collections::BTreeSet;

@@ -1,4 +1,4 @@
-//! Whole kernels on the inputs of their check, beside the CPU's way to the same results.
+//! Compares whole kernels with the CPU's loops, on the inputs of the check of kernels.
 
 use bytemuck::{AnyBitPattern, NoUninit, Zeroable as _};
 

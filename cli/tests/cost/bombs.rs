@@ -1,5 +1,5 @@
-//! Small inputs that say they are large: the memory to read one is bounded by its length, counted by the
-//! allocator. Each was once read into gigabytes, or could be.
+//! Small inputs that claim to be large: the memory for reading one is bounded by its length, measured by the allocator.
+//! Earlier versions used gigabytes for some of them.
 
 use std::fmt::Write as _;
 use std::io::Write as _;

@@ -1,5 +1,4 @@
-//! A Vulkan loader that fails on demand: it stands before the real one, at the
-//! boundary that `ash` calls.
+//! A Vulkan loader that fails on demand. It passes calls on to the real loader; `ash` loads it in place of that one.
 //!
 //! * `FAULTS`: `CALL,RESULT,FIRST,COUNT` separated by blanks: from the FIRST call (counted
 //!   from 1), COUNT calls of it return RESULT.

@@ -1,4 +1,4 @@
-//! Drivers that are not as lavapipe is:
+//! Simulates drivers with other properties than lavapipe:
 //!
 //! * `FAULT_STORAGE_BUFFERS`: how many storage buffers a kernel may bind;
 //! * `FAULT_PORTABILITY`: the device has not all of Vulkan: only instances that ask for it see

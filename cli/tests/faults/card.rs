@@ -1,5 +1,5 @@
-//! A card that the loader makes of the software device: a queue that only copies, and memory of which
-//! some is the device's, some the host's and some both.
+//! A card that the loader simulates on the software device: it has a queue that only copies, and memory of the device,
+//! of the host, and of both.
 
 use std::collections::BTreeMap;
 use std::fs;

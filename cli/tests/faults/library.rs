@@ -1,4 +1,4 @@
-//! Faults during uses of the library that the program does not have.
+//! Faults during uses of the library that do not occur in the program.
 
 use std::collections::BTreeMap;
 use std::process::Command;

@@ -1,4 +1,5 @@
-//! Drivers that are not as lavapipe is: they have not all of Vulkan, bind few storage buffers, take long.
+//! Drivers with other properties than lavapipe: they do not support all of Vulkan, bind few storage buffers, or take
+//! long.
 
 use std::collections::BTreeMap;
 use std::fs;

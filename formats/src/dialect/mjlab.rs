@@ -1,4 +1,4 @@
-//! The motion of mjlab and of `BeyondMimic`, whose files differ in the order of bodies and joints alone: depth first and
+//! The motion of mjlab and of `BeyondMimic`, whose files differ only in the order of bodies and joints: depth first and
 //! breadth first. The first body is the root in both.
 
 use super::{Axis, BODY_NAMES, Dialect, JOINT_NAMES, root_and_joints};

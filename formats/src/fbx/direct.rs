@@ -1,4 +1,5 @@
-//! Evaluates the transform of a node whose curves are in one layer as `ufbx` does, from the curves that matter only.
+//! Evaluates the transform of a node whose curves are in one layer, as `ufbx` does, but only from the curves that have
+//! an effect.
 //!
 //! For each time, `ufbx` looks up nine properties by name and converts constant angles to quaternions again. Here
 //! this is done once for each node, and each curve is searched from its last key on. Both results are compared at

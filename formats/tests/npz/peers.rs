@@ -1,5 +1,5 @@
-//! Our numbers beside those that `NumPy` and `SciPy` compute from the samples and read from the
-//! files that we write (`npz/peers.py`). `scripts/test.sh` makes the environment.
+//! Compares Tumble's numbers with those that `NumPy` and `SciPy` compute from the samples, or read from the files that
+//! Tumble writes (`npz/peers.py`). `scripts/test.sh` makes the environment.
 
 use std::path::Path;
 use std::process::Command;

@@ -1,5 +1,5 @@
-//! How long the driver takes to compile each kernel when nothing is cached: a process of its own, in which the
-//! drivers' caches are off, compiles them.
+//! Measures how long the driver takes to compile each kernel without caches, in a separate process in which the
+//! drivers' caches are off.
 
 use std::io::{BufRead as _, BufReader, Write as _};
 use std::process::{Command, Stdio};

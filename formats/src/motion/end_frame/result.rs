@@ -1,4 +1,4 @@
-//! Which rule for the end a result has: the one that is asked for, if the result can store it, or the default.
+//! Chooses the rule for the end of a result: the requested one, if the result can store it, otherwise the default.
 
 use crate::feature::Feature;
 use crate::format::{Document, Format, FormatOption};
