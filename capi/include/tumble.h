@@ -257,7 +257,7 @@ enum TumbleEnds
    */
   TUMBLE_ENDS_LOOP = 5,
   /*
-   The first and the last interval are constant, with the value of the first key of each.
+   The first and the last interval are constant: each has the value of its first key.
    */
   TUMBLE_ENDS_FROZEN = 6,
 };
@@ -1079,7 +1079,8 @@ const char *tumble_last_error(void);
 
  `device` selects the device by a name in upper or lower case:
 
- - "auto", or null: the CPU or the exact Vulkan device that is measured to be the fastest;
+ - "auto", or null: the CPU or the exact Vulkan device that is measured to be the fastest for large results;
+   the choice is made once, here;
  - "cpu": the CPU;
  - "vulkan": the first Vulkan device that can be opened and passes the self-test;
  - any other text: the Vulkan device with this index, counted from 0, or the first one whose name contains the
@@ -2605,7 +2606,7 @@ TumbleResult tumble_crowd_target_new(const struct TumbleCrowd *crowd,
  `stage` is a `TumbleCrowdStage`. A frame is then, for example: `tumble_crowd_record` with a target for
  `TUMBLE_CROWD_VALUES_LOCAL` in this range, the application's own commands that change these matrices (inverse
  kinematics), and `tumble_crowd_record` with the stage's target, which makes them skinning matrices. The stage
- continues the matrices of as many instances as are visible when it is recorded. Anything may have written these
+ continues the matrices of as many instances as are visible when it is recorded. The application may have changed these
  matrices. Results have the bits of the CPU, if all numbers are finite and less than 2^36 in magnitude; where
  nothing was changed, they have the bits of an evaluation without stages. The buffer, its range and the errors
  are as for `tumble_crowd_target_new` with matrices in 32 bits.
