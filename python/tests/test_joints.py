@@ -96,7 +96,7 @@ def test_clips_of_other_clocks_are_compared_where_both_have_keys(keys):
     found = tumble.compare(first, shifted)
     # Keys that are one frame late are a different motion.
     assert found.rotation.largest > 0.1
-    with pytest.raises(tumble.InputError, match="no time|in common|overlap"):
+    with pytest.raises(tumble.InputError, match="no common time"):
         tumble.compare(first, made(keys, times=TIMES + 1e9))
 
 
