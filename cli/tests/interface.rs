@@ -37,6 +37,7 @@ const CLOSED_ENUMS: &[(&str, &str)] = &[
         "the reference is stated in full",
     ),
     ("trees::BodyOrder", "who reads robots must know every order"),
+    ("trees::BodyRows", "rows or arrays"),
     ("trees::JointKind", "who reads robots must treat every kind"),
     ("trees::Siblings", "who reads robots must know every order"),
 ];
@@ -65,6 +66,10 @@ const CLOSED_STRUCTS: &[(&str, &str)] = &[
     ),
     ("reference::Follower", "the reference is stated in full"),
     ("reference::VectorCurve", "the reference is stated in full"),
+    (
+        "trees::BodyArrays",
+        "memory of the caller, with a default for every part",
+    ),
     ("trees::BodyMotion", "a pose and its velocity"),
     ("trees::BodyPose", "a rotation and a position"),
     ("trees::BodyVelocity", "two velocities"),
@@ -126,6 +131,8 @@ const NOT_CLONED: &[(&str, &str)] = &[
     ("paths::Followed", "it has samples"),
     ("reference::FollowerWalk", "it steps along a path"),
     ("reference::ReferenceCurve", "it is made of functions"),
+    ("trees::BodyArrays", "it lends memory of the caller"),
+    ("trees::BodyRows", "it lends memory of the caller"),
     ("vulkan::ClipTarget", "it owns objects of Vulkan"),
     ("vulkan::CrowdTarget", "it owns objects of Vulkan"),
     ("vulkan::TimedTarget", "it owns objects of Vulkan"),

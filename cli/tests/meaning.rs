@@ -221,7 +221,7 @@ fn digits_of_an_f64_show_its_rate() {
     refused(
         folder,
         "compare log.tum other.tum --ape",
-        "log.tum from 1700000000 to 1700000001.95 s, other.tum from 0 to 1 s; both need one clock",
+        "log.tum from 1700000000 to 1700000001.95 s, other.tum from 0 to 1 s; both must use the same clock",
     );
 }
 
@@ -279,7 +279,7 @@ fn a_loop_that_does_not_close_is_not_smoothed_silently() {
     let made = line(folder, &format!("smooth open.dat {smooth}"));
     says(
         &made,
-        "--edges loop joins the last sample to the first, and they are up to 73.7° apart",
+        "--edges loop joins the last sample to the first, but they are up to 73.7° apart",
     );
 }
 

@@ -208,7 +208,7 @@ fn nodes_become_a_skeleton_in_the_units_of_the_file() {
     };
     let (code, message) = warning("glb").unwrap();
     assert_eq!(code, Code::OtherSpace);
-    assert!(message.contains("0.01 m with z up"), "{message}");
+    assert!(message.contains("units of 0.01 m and z up"), "{message}");
     assert_eq!(warning("npz"), None);
     let [clip] = &loaded.clips[..] else {
         panic!("{:?}", loaded.clips);

@@ -21,7 +21,7 @@ fn frames_that_f32_cannot_tell_apart_are_refused_with_the_rate_that_fits() {
     let said = refused.to_string();
     assert!(said.contains("/animations/0: error[E182]"), "{said}");
     assert!(
-        said.contains("0.0078125 s apart") && said.contains("give --fps 128 or less"),
+        said.contains("steps of f32 are 0.0078125 s") && said.contains("give --fps 128 or less"),
         "{said}"
     );
     let found = times(document(&loaded), &loaded.clips[0], rate(128));

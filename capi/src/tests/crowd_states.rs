@@ -167,12 +167,12 @@ fn layers_are_all_set_or_none() {
         );
         assert_eq!(tick, 7);
     }
-    for seconds in [f64::NAN, -1.0, 1e300] {
-        fails(
-            tumble_crowd_advance(crowd, seconds),
-            argument,
-            "times and steps",
-        );
+    for (seconds, words) in [
+        (f64::NAN, "times and steps"),
+        (-1.0, "-1 s is negative"),
+        (1e300, "times and steps"),
+    ] {
+        fails(tumble_crowd_advance(crowd, seconds), argument, words);
     }
     fails(tumble_crowd_set_clock(crowd, u64::MAX), argument, "2^52");
     assert!(
