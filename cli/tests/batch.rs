@@ -832,10 +832,10 @@ fn results_are_discarded_only_where_that_is_asked_for() {
 }
 
 /// Kills at random moments, each resumed: every file under its name is whole at any time, and
-/// the results are those of an undisturbed run, byte for byte. `SOAK` kills 500 times.
+/// the results are those of an undisturbed run, byte for byte. There are 60 kills; `SOAK` makes 500.
 #[cfg(unix)]
 #[test]
-fn two_hundred_kills_lose_nothing() {
+fn kills_lose_nothing() {
     let temporary = sample_folder();
     let folder = temporary.path();
     fs::create_dir(folder.join("walks")).unwrap();
@@ -861,7 +861,7 @@ fn two_hundred_kills_lose_nothing() {
     let out = folder.join("out");
     let mut random = Random(7);
     let (mut kills, mut finished, mut interrupted) = (0, 0, 0);
-    let enough = std::env::var_os("SOAK").map_or(200, |_| 500);
+    let enough = std::env::var_os("SOAK").map_or(60, |_| 500);
     while kills < enough {
         // Now into an empty directory, now over other results.
         let replacing = finished % 2 == 1;
@@ -905,7 +905,10 @@ fn two_hundred_kills_lose_nothing() {
     );
     assert_eq!(last.code, 0, "{}", last.words);
     assert_eq!(tree(&out), whole);
-    assert!(finished > 10, "only {finished} runs came to their end");
+    assert!(
+        finished * 20 > enough,
+        "only {finished} runs came to their end"
+    );
 }
 
 /// `check` names the command that made a directory, and no other command resumes it.
