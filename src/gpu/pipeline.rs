@@ -189,6 +189,21 @@ pub(crate) enum Exactness {
     LeftToTheDriver,
 }
 
+impl Drop for Pipeline {
+    fn drop(&mut self) {
+        if self.device.may_destroy() {
+            // SAFETY: created from this device, no longer in use; null is allowed.
+            unsafe {
+                self.device.raw.destroy_pipeline(self.raw, None);
+                self.device.raw.destroy_pipeline_layout(self.layout, None);
+                self.device
+                    .raw
+                    .destroy_descriptor_set_layout(self.set_layout, None);
+            }
+        }
+    }
+}
+
 /// Drivers that compile a kernel to something else.
 #[cfg(test)]
 pub(crate) mod faults {
@@ -215,20 +230,5 @@ pub(crate) mod faults {
             }
         }
         words
-    }
-}
-
-impl Drop for Pipeline {
-    fn drop(&mut self) {
-        if self.device.may_destroy() {
-            // SAFETY: created from this device, no longer in use; null is allowed.
-            unsafe {
-                self.device.raw.destroy_pipeline(self.raw, None);
-                self.device.raw.destroy_pipeline_layout(self.layout, None);
-                self.device
-                    .raw
-                    .destroy_descriptor_set_layout(self.set_layout, None);
-            }
-        }
     }
 }

@@ -268,7 +268,7 @@ fn keys(random: &mut Random) -> [[f32; 4]; 4] {
 /// A number up to 1 of which the root is taken, or one whose root is nearly half way between two numbers.
 fn square(random: &mut Random) -> f32 {
     match random.once_in(8) {
-        true => f32::from_bits((127 - 2 * random.below(12) << 23) + random.below(4) - 1),
+        true => f32::from_bits(((127 - 2 * random.below(12)) << 23) + random.below(4) - 1),
         false => ((random.word() >> 8) + 1) as f32 / (1 << 24) as f32,
     }
 }

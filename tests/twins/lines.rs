@@ -708,8 +708,9 @@ fn uneven(tracks: usize, step: usize, angle: f64) -> (TrackSet, SampleTimes) {
 #[test]
 fn a_wave_executes_few_operations_for_a_rotation() {
     type Workload = fn(usize, usize, f64) -> (TrackSet, SampleTimes);
+    type Case = (Workload, usize, (Layout, f64), usize, [f64; 2]);
     let (by_track, by_frame) = ((Layout::TrackMajor, WILD), (Layout::FrameMajor, GENTLE));
-    let workloads: [(Workload, usize, (Layout, f64), usize, [f64; 2]); 8] = [
+    let workloads: [Case; 8] = [
         (even, 40, by_track, 8, [95.2, 109.5]),
         (even, 40, by_track, 16, [68.1, 75.8]),
         (even, 40, by_track, 48, [60.2, 66.2]),

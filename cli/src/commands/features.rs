@@ -298,10 +298,10 @@ impl Arguments {
                 warn_of_other_unit(name, of_set, &poses);
             }
         }
-        if self.sets.contains(&FeatureSet::Mirror) {
-            if let Some(warning) = lost_partners(name, &poses.names, &mirror_pairs(&poses.names)) {
-                words::warn_of(warning);
-            }
+        if self.sets.contains(&FeatureSet::Mirror)
+            && let Some(warning) = lost_partners(name, &poses.names, &mirror_pairs(&poses.names))
+        {
+            words::warn_of(warning);
         }
         let failed =
             |error: &dyn std::fmt::Display| Failure::new(ALL_INPUTS, format!("{name}: {error}"));
